@@ -359,7 +359,6 @@ JOBS = {  # name: (arguments of covol, kind of truth, shape, file of the points 
     "m many": (MARKS.format("many"), "mask", "many"),
     "m many alone": (MARKS.format("many") + " --rho 0", "mask", "many"),
     "m strays": (MARKS.format("many").replace("p_many.csv", "p_strays.csv"), "mask", "many"),
-    "m strays alone": (MARKS.format("many").replace("p_many.csv", "p_strays.csv") + " --rho 0", "mask", "many"),
     "m torus alone": (MARKS.format("torus") + " --rho 0", "mask", "torus"),
     "m sides": (MARKS.format("two") + " --inside -0.55,0,0 --inside 0.55,0.1,0.05 --outside 0,0.9,0", "mask", "two"),
     "m tag": (MARKS.format("dense") + " --init tag", "mask", "dense"),
@@ -416,11 +415,11 @@ REAL_ASTRAY = [f"{real_name(name, DOUBT_COUNT)} astray" for name in REAL[::4]] i
 DOUBTED = ["plate right", "folds right", "folds wrong", "torus right", *([doubt_name(name, kind) for name in REAL[::2] for kind in ("right", "wrong")] if REAL_JOBS else [])]
 REAL_EXPECTED = [f"{name} expected" for name in REAL_FEW]
 PLAN = {  # step of a constant: the jobs in which it is varied
-    "common": ["spikes noisy", "m torus", "m contours", "m tag", "front", "m grow box", "m guess", "plate", *REAL_FEW[:2]],
+    "common": ["m strays", "spikes noisy", "m torus", "m contours", "m tag", "front", "m grow box", "m guess", "plate", *REAL_FEW[:2]],
     **dict.fromkeys(("cloud", "cloud_scale", "stray", "filled", "indicator", "iteration", "propagation", "local_fit", "crease", "blend", "join_pieces"), CLOUDS),
     "orientation": [*CLOUDS, "normals random"], **dict.fromkeys(("views", "layers"), SCANS), "given_sides": GIVEN,
     **dict.fromkeys(("tag_distance", "scan_noise"), TAGGED),
-    **dict.fromkeys(("guess", "marks_surface"), [*ALONE, *REAL_ALONE]), "isolated": ["m strays", "m strays alone", *ALONE[:4], *REAL_ALONE[:1], *REAL_ASTRAY[:1]], "correction": CORRECTED,
+    **dict.fromkeys(("guess", "marks_surface"), [*ALONE, *REAL_ALONE]), "correction": CORRECTED,
     "guidance": GUESSED + REAL_FEW[:6] + LAPSES, "inference": [*REAL_FEW, *REAL_ASTRAY, *REAL_EXPECTED], "doubts": DOUBTED,
     **dict.fromkeys(("contours", "outline"), [*CONTOURS, *REAL_OUTLINES[:1]]), "grow": GROWN, "time_lapse": LAPSES,
     **dict.fromkeys(("edge", "evolve", "motion"), [*FLOWS, *LINES, "m contours"]), "flow": [*FLOWS[:3], "m line", "m contours sphere", *REAL_OUTLINES],

@@ -35,13 +35,4 @@ struct ScanNoiseHeuristics {
 };
 COVOL_HEURISTICS ScanNoiseHeuristics kScan{};
 
-/// Marks from misplaced clicks: isolated_points.cpp.
-struct IsolatedHeuristics {
-    /// [median links] Length of the next link of the minimum spanning tree above which the groups that it joins are
-    /// separate, even if it is not common.clear_ratio times as long as the link before, as with several isolated
-    /// points. Links between marks on seven structures are at most 2.6 long.
-    double far = heuristic("isolated.far", 6.0);
-};
-COVOL_HEURISTICS IsolatedHeuristics kIsolated{};
-
 }  // namespace covol

@@ -7,7 +7,6 @@
 #include "base/disjoint_sets.h"
 #include "base/heuristics.h"
 #include "covol/points.h"
-#include "points/heuristics.h"
 #include "points/kd_tree.h"
 
 namespace covol {
@@ -109,13 +108,11 @@ std::vector<IsolatedPoint> find_isolated_points(const std::vector<Vec3>& points)
                     links.begin());
     for (std::size_t n = 0; n < first; ++n) groups.merge(links[n]);
     if (groups.places() < 2) return {};
-    const double usual = links[(first + links.size()) / 2].length;
+    // Links are compared with the longest one that is not an exception.
+    const double usual = links[first + std::size_t((1 - kCommon.minority) * double(links.size() - first))].length;
     for (std::size_t n = first; n + 1 < links.size(); ++n) {
         groups.join(links[n]);
-        const double next = links[n + 1].length;
-        // Each link is compared with the next shorter one. For correct marks on seven structures, both evenly
-        // distributed and on outlines, the ratio of their lengths is at most 1.4.
-        const bool is_long = next > kCommon.clear_ratio * links[n].length || next > kIsolated.far * usual;
+        const bool is_long = links[n + 1].length > kCommon.clear_ratio * usual;
         if (is_long && groups.largest_is_all_but_few()) return points_outside(groups.largest(), groups, points);
     }
     return {};

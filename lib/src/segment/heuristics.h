@@ -42,9 +42,7 @@ struct FlowHeuristics {
     int min_coarsened = limit("flow.min_coarsened", 64);
     /// [steps] Maximum number of steps of the first flow after tagging, in which only the points attract.
     int approach_steps = limit("flow.approach_steps", 40);
-    /// [passes] Maximum number of times that the image moves the body between contours.
-    int contour_passes = heuristic("flow.contour_passes", 3);
-    /// [distances between marked slices] Range within which the image may move the body between contours in one pass.
+    /// [distances between marked slices] Range within which the image may move the body between contours.
     double contour_range = heuristic("flow.contour_range", 0.25);
 };
 COVOL_HEURISTICS FlowHeuristics kFlow{};

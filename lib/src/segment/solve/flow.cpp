@@ -94,17 +94,6 @@ FloatGridPtr query_image(const Problem& problem, const StartFacts& start, const 
     if (start.inference.used) options.range = kInference.off_cells * start.domain.voxel_size;
     solution.was_requested = true;
     Guided guided = guide(*u, marks, *problem.image, options, problem.run);
-    // Between contours the start may be far off: if guidance reduces the error, its result is a better start for the
-    // next pass.
-    const int passes = start.origin == StartOrigin::Contours ? kFlow.contour_passes : 1;
-    for (int pass = 1; pass < passes && guided.report.used; ++pass) {
-        if (!(guided.report.image_error < guided.report.guess_error)) break;
-        Guided again = guide(*guided.u, marks, *problem.image, options, problem.run);
-        if (!again.report.used) break;
-        again.report.mean_offset += guided.report.mean_offset;
-        again.report.max_offset = std::max(again.report.max_offset, guided.report.max_offset);
-        guided = std::move(again);
-    }
     const GuidanceReport& report = solution.guidance = std::move(guided.report);
     solution.report.remarks.choose("image", report.used ? "used" : "not used", report.reason, problem.run);
     return guided.u;
