@@ -27,9 +27,6 @@ struct InferenceHeuristics {
     /// [cells or voxels] Maximum plausible distance of a correct mark from the surface that it marks: cells on the
     /// lattice of an inferred body, otherwise voxels.
     double off_cells = heuristic("inference.off_cells", 2);
-    /// [of the marks] Maximum fraction that may lie off a body; with more, the body is rejected. It is also the maximum
-    /// fraction that is left out as wrong.
-    double max_off = heuristic("inference.max_off", 0.2);
     /// [voxels] Distance up to which misses of a guess are measured: margin of the box around the missed marks in which
     /// the distances from its surface are computed.
     double farthest_miss = limit("inference.farthest_miss", 30);
@@ -46,5 +43,9 @@ struct InferenceHeuristics {
     double expected_factor = heuristic("inference.expected_factor", 2);
 };
 COVOL_HEURISTICS InferenceHeuristics kInference{};
+
+/// Maximum fraction of the marks that may lie off a body, or may be left out as wrong: clearly more than the exceptions
+/// that are expected.
+inline double max_fraction_off() { return kCommon.clear_ratio * kCommon.minority; }
 
 }  // namespace covol

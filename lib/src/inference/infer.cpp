@@ -172,7 +172,7 @@ bool Inference::leave_out_wrong(const HeldOut& held) {
         if (neighbours < 2) all.push_back(suspect);
     }
     const double given = double(marks_.places.size() + wrong_.size());
-    if (all.size() == wrong_.size() || all.size() < 2 || double(all.size()) > kInference.max_off * given) return false;
+    if (all.size() == wrong_.size() || all.size() < 2 || double(all.size()) > max_fraction_off() * given) return false;
     wrong_ = std::move(all);
     marks_ = marks_.without(wrong_, image_.geometry());
     choose_box();
@@ -471,7 +471,7 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
                     : "the surface of minimum bending energy predicts held-out marks better");
             return;
         }
-        if (fraction_off(geometry, result.marks, body, level) > kInference.max_off) {
+        if (fraction_off(geometry, result.marks, body, level) > max_fraction_off()) {
             report.expected.reset();
             reject_body("the most probable body given the image misses many marks");
             return;

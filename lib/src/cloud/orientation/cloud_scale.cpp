@@ -10,7 +10,6 @@
 
 #include "base/heuristics.h"
 #include "base/median.h"
-#include "cloud/indicator/heuristics.h"
 #include "cloud/orientation/heuristics.h"
 #include "covol/orientation.h"
 #include "covol/points.h"
@@ -130,7 +129,7 @@ CloudScale measure_cloud_scale(const std::vector<Vec3>& points, const RunContext
         }
         // Stops when the neighbourhoods are sheets, or when the deviation relative to the radius increases again,
         // because the surface's curvature then contributes to the deviation.
-        if (best < kCloud.flat || noise / radius > (1 + kCommon.minority) * best) break;
+        if (best < kCloudScale.sheet || noise / radius > (1 + kCommon.minority) * best) break;
     }
     return scale;
 }

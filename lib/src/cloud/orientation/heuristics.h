@@ -12,6 +12,9 @@ struct CloudScaleHeuristics {
     int radii = limit("cloud_scale.radii", 14);
     /// [median distances to the nearest point] The smallest radius of the neighbourhoods that are tried.
     double first_spacings = heuristic("cloud_scale.first_spacings", 3.0);
+    /// [radii] Standard deviation from the quadric below which the neighbourhood is a sheet; it is 0.45 for points that
+    /// fill a ball.
+    double sheet = heuristic("cloud_scale.sheet", 0.15);
 };
 COVOL_HEURISTICS CloudScaleHeuristics kCloudScale{};
 

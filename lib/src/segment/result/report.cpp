@@ -156,10 +156,9 @@ private:
             is_line(feature) ? detail::BorderKind::Line : detail::BorderKind::Slope, problem_.run);
         report_.image_border = {border.at, border.fraction, border.errors};
         // The middle of a wide line is uniform, but the image predicts marks there, too.
-        const bool is_doubtful = solution_.was_requested
-                                     ? support.fraction < kDoubts.image_support && guidance.gain < kDoubts.clear_gain
-                                     : support.fraction + kCommon.errors * support.error < 0.5;
-        if (is_doubtful)
+        const bool is_unpredicted = solution_.was_requested && guidance.gain < kDoubts.clear_gain;
+        if (support.fraction + kCommon.errors * support.error < 0.5 ||
+            (is_unpredicted && support.fraction < kDoubts.image_support))
             warn("the image does not show a border at the marks: it varies more there than five voxels away in only " +
                  number(std::round(100 * support.fraction)) +
                  " of 100 pairs, with 50 by chance; check whether the marks belong to this image, channel and "
