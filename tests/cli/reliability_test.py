@@ -316,6 +316,15 @@ class WrongInSilence(Case):
             self.assertEqual(warnings, [])
             self.assertGreater(support, 0.9)
 
+    def test_marks_on_the_middle_of_a_wide_line_are_not_doubted(self):
+        # The image is uniform there, but predicts the marks well.
+        for kind in ("round", "slit"):
+            with self.subTest(kind):
+                self.run_covol("phantom", f"sphere-{kind}", "--size", 64, "-o", "p.nrrd", "--points", "p.csv", "--count", 300, "--seed", 3)
+                report = self.report("segment", "p.nrrd", "--points", "p.csv", "-o", "s.vdb")
+                self.assertEqual(report.get("warnings", []), [])
+                self.assertLess(report["fit"]["image_support"], 0.55)
+
     def test_noise(self):
         warnings, support = self.warnings(self.noise, self.marks)
         self.assertIn("does not show a border at the marks", " ".join(warnings))
