@@ -267,6 +267,12 @@ def moved_within(marks, shift, last):
     return np.clip(marks + np.where(forward, shift, -shift), 0, last)
 
 
+def real_job(structure, kind, file, *options):
+    """Arguments for a file of marks, whose kind is --points or --contours."""
+    return shlex.join(["segment", str(structure.image), *structure.options, kind, f"../in/{file}.csv", "--points-space", "index",
+                       "-o", "s.vdb", "--mask", "m.nrrd", *options])
+
+
 def make_real(folder):
     """Marks and truths; options that a job needs for its image are added to JOBS."""
     import annotator
@@ -278,30 +284,24 @@ def make_real(folder):
             np.save(folder / f"{structure.name}.npy", structure.truth)
             if structure.name in OUTLINED:
                 common.write_contours(folder / f"{structure.name} outlines.csv", annotator.contours_of(structure, OUTLINED_STEP, REAL_DRAW))
-                arguments = ["segment", str(structure.image), *structure.options, "--contours", f"../in/{structure.name} outlines.csv",
-                             "--points-space", "index", "-o", "s.vdb", "--mask", "m.nrrd"]
-                JOBS[f"{structure.name} outlines"] = (shlex.join(arguments), "real", structure.name)
+                JOBS[f"{structure.name} outlines"] = (real_job(structure, "--contours", f"{structure.name} outlines"), "real", structure.name)
             for count in REAL_COUNTS:
                 name = real_name(structure.name, count)
                 np.savetxt(folder / f"{name}.csv", annotator.marks_of(structure, count, REAL_DRAW), "%.5f", ",", header="x,y,z", comments="")
-                arguments = ["segment", str(structure.image), *structure.options, "--points", f"../in/{name}.csv", "--points-space", "index",
-                             "-o", "s.vdb", "--mask", "m.nrrd"]
-                JOBS[name] = (shlex.join(arguments), "real", structure.name)
-                JOBS[f"{name} expected"] = (shlex.join([*arguments, "--json", "r.json"]), "expected", structure.name)
-                JOBS[f"{name} alone"] = (shlex.join([*arguments, "--rho", "0"]), "real", structure.name)
+                JOBS[name] = (real_job(structure, "--points", name), "real", structure.name)
+                JOBS[f"{name} expected"] = (real_job(structure, "--points", name, "--json", "r.json"), "expected", structure.name)
+                JOBS[f"{name} alone"] = (real_job(structure, "--points", name, "--rho", "0"), "real", structure.name)
                 if count == DOUBT_COUNT:
                     marks = np.loadtxt(folder / f"{name}.csv", delimiter=",", skiprows=1)
                     last = np.array(structure.truth.shape[::-1]) - 1
                     astray = marks.copy()
                     astray[::10] = moved_within(marks[::10], ASTRAY * np.ptp(marks, 0), last)  # a tenth of the marks is wrong
                     np.savetxt(folder / f"{name}_astray.csv", astray, "%.5f", ",", header="x,y,z", comments="")
-                    JOBS[f"{name} astray"] = (shlex.join(arguments).replace(f"{name}.csv", f"{name}_astray.csv"), "real", structure.name)
+                    JOBS[f"{name} astray"] = (real_job(structure, "--points", f"{name}_astray"), "real", structure.name)
                     moved = moved_within(marks, DOUBT_SHIFT * np.ptp(marks, 0), last)
                     np.savetxt(folder / f"{name}_wrong.csv", moved, "%.5f", ",", header="x,y,z", comments="")
-                    for kind, marks in (("right", name), ("wrong", f"{name}_wrong")):
-                        with_report = [*arguments, "--json", "r.json"]
-                        with_report[with_report.index("--points") + 1] = f"../in/{marks}.csv"
-                        JOBS[doubt_name(structure.name, kind)] = (shlex.join(with_report), "doubt", kind)
+                    for kind, file in (("right", name), ("wrong", f"{name}_wrong")):
+                        JOBS[doubt_name(structure.name, kind)] = (real_job(structure, "--points", file, "--json", "r.json"), "doubt", kind)
 
 
 def real_error(folder, out, structure):

@@ -22,6 +22,7 @@
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "covol/mesh_relax.h"
+#include "mesh/missing_vertex.h"
 #include "meshing/decimate.h"
 #include "meshing/mesh_distance.h"
 #include "meshing/safe_moves.h"
@@ -247,10 +248,8 @@ void check_indices(const TriangleMesh& mesh, const char* where) {
     for (const auto& t : mesh.triangles)
         for (const std::uint32_t v : t)
             if (v >= mesh.vertices.size())
-                throw Error(Errc::InvalidInput, std::string(where) + ": a triangle refers to vertex " +
-                                                    std::to_string(v) +
-                                                    " (counted from 0), but the number of vertices is " +
-                                                    std::to_string(mesh.vertices.size()));
+                throw Error(Errc::InvalidInput,
+                            std::string(where) + ": a triangle " + detail::refers_to_missing(v, mesh.vertices.size()));
 }
 
 }  // namespace

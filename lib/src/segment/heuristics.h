@@ -55,7 +55,7 @@ struct DoubtsHeuristics {
     double far_from_guess = heuristic("doubts.far_from_guess", 4.0);
     /// [probability] Minimum probability that the image varies more at a mark than beside it, for the image to show the
     /// marked border: 0.5 for an unrelated image. Of 146 right results from 20 to 300 marks or from contours of 33
-    /// structures, none is below it; of 567 wrong results of shifted, mirrored, scaled or random marks, 366 are.
+    /// structures, none is below it; of 567 wrong results of shifted, mirrored, scaled or random marks, 368 are.
     double image_support = heuristic("doubts.image_support", 0.55);
     /// [nats] Gain of guidance per mark, from which on the marks fit the image even in a uniform region: at least 0.96
     /// for marks on the middle of wide lines, at most 0.58 for the wrong results that image_support finds.

@@ -12,6 +12,7 @@
 #include "covol/error.h"
 #include "covol/version.h"
 #include "io/mesh/mesh_formats.h"
+#include "mesh/missing_vertex.h"
 
 namespace covol::mesh_io {
 namespace {
@@ -185,9 +186,7 @@ private:
         const std::uint64_t first = placed.first, count = placed.second;
         std::vector<std::uint32_t> corners;
         const auto corner = [&](std::uint64_t vertex) {
-            if (vertex >= count)
-                source_.fail("a triangle refers to vertex " + std::to_string(vertex) +
-                             " (counted from 0), but the number of vertices is " + std::to_string(count));
+            if (vertex >= count) source_.fail("a triangle " + detail::refers_to_missing(vertex, count));
             corners.push_back(std::uint32_t(first + vertex));
             if (corners.size() < 3) return;
             builder_.face(corners);

@@ -9,6 +9,7 @@
 #include "covol/domain.h"
 #include "covol/mesh.h"
 #include "io/mesh/mesh_source.h"
+#include "mesh/missing_vertex.h"
 #include "mesh/polygon.h"
 #include "mesh/triangle.h"
 
@@ -66,9 +67,7 @@ public:
 
 private:
     void check(std::uint32_t v) const {
-        if (v >= vertex_count())
-            source_.fail("a face refers to vertex " + std::to_string(v) +
-                         " (counted from 0), but the number of vertices is " + std::to_string(vertex_count()));
+        if (v >= vertex_count()) source_.fail("a face " + detail::refers_to_missing(v, vertex_count()));
     }
     void triangle(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
         if (a != b && b != c && c != a) mesh_.triangles.push_back({a, b, c});

@@ -15,6 +15,7 @@
 #include "covol/safe_text.h"
 #include "files/atomic.h"
 #include "io/mesh/mesh_formats.h"
+#include "mesh/missing_vertex.h"
 #include "mesh/vertex_normals.h"
 
 // These readers and writers replace those of OpenMesh: its readers trust the counts in a file's header, omit triangles
@@ -38,9 +39,7 @@ void check_references(const TriangleMesh& mesh) {
     for (const Face& t : mesh.triangles)
         for (const std::uint32_t v : t)
             if (v >= mesh.vertices.size())
-                throw Error(Errc::InvalidInput, "a triangle refers to vertex " + std::to_string(v) +
-                                                    " (counted from 0), but the number of vertices is " +
-                                                    std::to_string(mesh.vertices.size()));
+                throw Error(Errc::InvalidInput, "a triangle " + detail::refers_to_missing(v, mesh.vertices.size()));
 }
 
 void check_attribute(const VertexAttribute& attribute, const TriangleMesh& mesh) {
