@@ -15,7 +15,7 @@ A mechanism is switched off by COVOL_SCALE (base/heuristics.h), which makes its 
   distance from the points to the surface, or, for a ball, from the surface to the sphere.
 - jobs: all small jobs of sensitivity_jobs.JOBS: clouds, scans of one side, given normals, contours, painted slices, guesses, growth.
 
-`--scale "layers.farthest_layer=0"` tries what is not in the list; `--against BINARY` compares two programs instead.
+`--scale "join_pieces.max_gap=0"` tries what is not in the list; `--against BINARY` compares two programs instead.
 """
 import argparse
 import concurrent.futures
@@ -59,7 +59,7 @@ MECHANISMS = {
     "iterations": ("the second iteration of guidance", "guidance.iterations=0.5", ("marks", "jobs")),
     "level_blur": ("blur over levels of intensity", "guidance.level_blur=0.001", ("marks", "jobs")),
     "sagitta": ("error of the guess by the sagitta", "guidance.fraction_of_sagitta=0", ("marks",)),
-    "layers": ("layers of a scan below others", "layers.farthest_layer=0", ("jobs",)),
+    "layers": ("layers of a scan below others", "layers.max_patches=0", ("jobs",)),
     "patches": ("turning of patches", "iteration.patch_off=100", ("clouds", "jobs")),
     "joining": ("joining of torn pieces", "join_pieces.max_gap=0", ("clouds", "jobs")),
     "creases": ("sheets that meet", "crease.radius=0", ("clouds",)),

@@ -1,15 +1,17 @@
 """The jobs of sensitivity.py: clouds and phantoms with known truth, each of about a second, and the error of their results."""
 import json
 import os
-import pathlib
 import shlex
 import subprocess
-import sys
 
 import numpy as np
+from scipy import ndimage
 from scipy.spatial import cKDTree
 
-sys.path.insert(0, str(pathlib.Path(__file__).parent / "marks"))
+if os.environ.get("COVOL_DATA"):
+    import sensitivity_real as real
+else:
+    real = None
 
 COUNT = 3000  # default number of points of a cloud
 
@@ -52,6 +54,9 @@ SHAPES = {
     # Two balls with a gap of 2 spacings of the points.
     "twins": union(ball((-0.62, 0, 0), 0.57), ball((0.62, 0, 0), 0.57)),
     "ball": ball((0, 0, 0), 1),
+    # A ball with six needles that are as thick as the distance between the points.
+    "needles": union(ball((0, 0, 0), 0.7), *[capsule((0, 0, 0), 1.4 * np.array(d) / np.linalg.norm(d), 0.04)
+                                             for d in ((1, 0, 0), (0, 1, 0), (-1, 0.3, 0), (0, -1, 0.4), (0, 0, 1), (0.2, 0.1, -1))]),
 }
 
 
@@ -122,6 +127,10 @@ def make_clouds(folder):
     points, normals = draw("torus", 18, 0.2)
     normals = np.random.default_rng(18).normal(size=normals.shape)
     write_points(folder / "normals_random.csv", points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
+    points, normals = draw("spikes", 21, 0.6, count=2000)
+    normals = np.random.default_rng(21).normal(size=normals.shape)
+    write_points(folder / "normals_noisy.csv", points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
+    write_points(folder / "needles.csv", draw("needles", 22, 0.5, count=2500)[0])
     write_points(folder / "thick.csv", draw("torus", 15, 0.7, count=5000)[0])
     # Folds of a ball: those with 30 waves are mistaken for noise, those with 12 are resolved.
     for waves, depth in ((30, 0.2), (12, 0.3)):
@@ -183,6 +192,29 @@ def write_torus_lines(folder, head):
     (folder / "s_scribbles.nrrd").write_bytes(head + inside.astype("u1").tobytes())
 
 
+def write_bar(folder, head):
+    """A bar whose sections, 15 by 3 voxels, are painted as areas on every sixth slice."""
+    at = (np.arange(44) - 21.5) * 2.6 / 44
+    z, y, x = np.meshgrid(at, at, at, indexing="ij")
+    inside = (np.abs(x) < 0.45) & (np.abs(y) < 0.09) & (np.abs(z) < 0.9)
+    image = 60 + 100 * inside + np.random.default_rng(21).normal(0, 15, inside.shape)
+    (folder / "p_bar.nrrd").write_bytes(head + image.clip(0, 255).astype("u1").tobytes())
+    (folder / "l_bar.nrrd").write_bytes(head + inside.astype("u1").tobytes())
+    surface = np.argwhere(inside & ~ndimage.binary_erosion(inside) & (z > 0))
+    for name, end in (("bar", 0), ("bar_short", -0.3)):  # guesses that lack the half and two thirds of the bar, and marks there
+        (folder / f"g_{name}.nrrd").write_bytes(head + (inside & (z < end)).astype("u1").tobytes())
+    rim = np.random.default_rng(23).permutation(surface)[:10]
+    write_points(folder / "ten_bar.csv", (rim[:, ::-1] - 21.5) * 2.6 / 44)
+    inside[np.arange(44) % 6 != 3] = False
+    (folder / "s_bar.nrrd").write_bytes(head + inside.astype("u1").tobytes())
+
+
+def write_faint_sphere(folder, head, labels):
+    """An image in which the sphere's contrast is half the standard deviation of the noise."""
+    image = 100 + 8 * (labels > 0) + np.random.default_rng(22).normal(0, 16, labels.shape)
+    (folder / "p_faint.nrrd").write_bytes(head + image.clip(0, 255).astype("u1").tobytes())
+
+
 def make_phantoms(folder, covol):
     for name, kind, count, noise in (("round", "sphere-round", 60, 0.1), ("torus", "torus", 80, 0.3), ("two", "two-spheres", 60, 0.2), ("slit", "sphere-slit", 60, 0),
                                      ("many", "torus", 350, 0.2), ("dense", "torus", 1500, 0.2), ("box", "box", 60, 0.2), ("sphere", "sphere", 300, 0.2)):
@@ -194,8 +226,8 @@ def make_phantoms(folder, covol):
                 values, own = read_nrrd(folder / f"{kind}_{name}.nrrd")
                 moved = np.roll(values, MOVED[name], (0, 1, 2))
                 (folder / f"{kind}_{name}_moved.nrrd").write_bytes(own.replace(b"encoding: gzip", b"encoding: raw") + b"\n\n" + np.ascontiguousarray(moved).tobytes())
+        raw = head.replace(b"encoding: gzip", b"encoding: raw") + b"\n\n"
         if name in ("torus", "round", "box"):
-            raw = head.replace(b"encoding: gzip", b"encoding: raw") + b"\n\n"
             wrong = np.roll(labels, (1, 2, 0), (0, 1, 2)) if name == "torus" else labels & np.roll(labels, 3, 0)
             (folder / f"g_{name}.nrrd").write_bytes(raw + np.ascontiguousarray(wrong).tobytes())
             grown = np.max([np.roll(labels, by, axis) for axis in range(3) for by in (-2, 0, 2)], axis=0)
@@ -205,6 +237,9 @@ def make_phantoms(folder, covol):
             (folder / f"s_{name}.nrrd").write_bytes(raw + painted.tobytes())
         if name == "torus":
             write_torus_lines(folder, raw)
+            write_bar(folder, raw)
+        if name == "sphere":
+            write_faint_sphere(folder, raw, labels)
         points = np.array([line.split(",")[:3] for line in (folder / f"p_{name}.csv").read_text().splitlines() if line[0] in "-0123456789"], float)
         if name == "many":  # with three accidental marks near corners of the image
             corners = np.array([[1.2, 1.2, 1.2], [-1.2, 1.2, -1.2], [1.2, -1.2, -1.1]])
@@ -230,91 +265,15 @@ def mask_error(folder, path, name):
     return 100 * (1 - 2 * float((truth & mask).sum()) / max(1, float(truth.sum() + mask.sum())))
 
 
-# ---- structures of real images: with COVOL_DATA --------------------------------------------------------------------
-
-# The structures of the second row were not used to choose constants. The marks are of the draw REAL_DRAW, which was
-# not used for this purpose either.
-REAL = ("spinal cord", "ventricle", "left atrium", "hippocampus", "worm nucleus 59", "embryo nucleus 2",
-        "caudate, right", "vertebra", "hippocampus, posterior", "mouse nucleus 395", "hippocampus 2", "thalamus")
-REAL_COUNTS = (60, 20)
-REAL_DRAW = 11
-OUTLINED, OUTLINED_STEP = ("spinal cord", "caudate, right", "hippocampus 2", "thalamus"), 4  # contours on every fourth slice
-
-
-# For the jobs that compare right with wrong marks: number of marks, and shift of the wrong marks along each axis as a
-# fraction of the extent of the marks.
-DOUBT_COUNT, DOUBT_SHIFT = 60, 0.4
-ASTRAY = 0.25  # shift of single wrong marks, in the same unit
-
-
-def real_name(structure, count):
-    return f"{structure} {count}"
-
-
-def doubt_name(structure, kind):
-    return f"{structure} {kind}"
-
-
 def doubt_error(out, kind):
     """Number of warnings of right marks, or 10 without a warning of wrong ones."""
     warnings = len(json.loads((out / "r.json").read_text()).get("warnings", []))
     return warnings if kind == "right" else 10 * (warnings == 0)
 
 
-def moved_within(marks, shift, last):
-    """Marks that are moved along each axis in the direction in which there is more space, but not beyond the image."""
-    forward = last - marks.max(0) >= marks.min(0)
-    return np.clip(marks + np.where(forward, shift, -shift), 0, last)
-
-
-def real_job(structure, kind, file, *options):
-    """Arguments for a file of marks, whose kind is --points or --contours."""
-    return shlex.join(["segment", str(structure.image), *structure.options, kind, f"../in/{file}.csv", "--points-space", "index",
-                       "-o", "s.vdb", "--mask", "m.nrrd", *options])
-
-
-def make_real(folder):
-    """Marks and truths; options that a job needs for its image are added to JOBS."""
-    import annotator
-    import common
-    import truth
-    data = os.environ["COVOL_DATA"]
-    for structure in [*truth.structures(data), *truth.more_structures(data)]:
-        if structure.name in REAL:
-            np.save(folder / f"{structure.name}.npy", structure.truth)
-            if structure.name in OUTLINED:
-                common.write_contours(folder / f"{structure.name} outlines.csv", annotator.contours_of(structure, OUTLINED_STEP, REAL_DRAW))
-                JOBS[f"{structure.name} outlines"] = (real_job(structure, "--contours", f"{structure.name} outlines"), "real", structure.name)
-            for count in REAL_COUNTS:
-                name = real_name(structure.name, count)
-                np.savetxt(folder / f"{name}.csv", annotator.marks_of(structure, count, REAL_DRAW), "%.5f", ",", header="x,y,z", comments="")
-                JOBS[name] = (real_job(structure, "--points", name), "real", structure.name)
-                JOBS[f"{name} expected"] = (real_job(structure, "--points", name, "--json", "r.json"), "expected", structure.name)
-                JOBS[f"{name} alone"] = (real_job(structure, "--points", name, "--rho", "0"), "real", structure.name)
-                if count == DOUBT_COUNT:
-                    marks = np.loadtxt(folder / f"{name}.csv", delimiter=",", skiprows=1)
-                    last = np.array(structure.truth.shape[::-1]) - 1
-                    astray = marks.copy()
-                    astray[::10] = moved_within(marks[::10], ASTRAY * np.ptp(marks, 0), last)  # a tenth of the marks is wrong
-                    np.savetxt(folder / f"{name}_astray.csv", astray, "%.5f", ",", header="x,y,z", comments="")
-                    JOBS[f"{name} astray"] = (real_job(structure, "--points", f"{name}_astray"), "real", structure.name)
-                    moved = moved_within(marks, DOUBT_SHIFT * np.ptp(marks, 0), last)
-                    np.savetxt(folder / f"{name}_wrong.csv", moved, "%.5f", ",", header="x,y,z", comments="")
-                    for kind, file in (("right", name), ("wrong", f"{name}_wrong")):
-                        JOBS[doubt_name(structure.name, kind)] = (real_job(structure, "--points", file, "--json", "r.json"), "doubt", kind)
-
-
-def real_error(folder, out, structure):
-    """1 - Dice, in %."""
-    import truth
-    return 100 * (1 - truth.dice(read_nrrd(out / "m.nrrd")[0] > 0, np.load(folder / f"{structure}.npy")))
-
-
-def expected_error(folder, out, structure):
-    """The interval score (Gneiting and Raftery 2007, eq. 43) of the expected 1 - Dice, whose interval has a probability of 90 %, in octaves: the width of the interval, and 20 times the distance of the actual value from the interval."""
-    expected = json.loads((out / "r.json").read_text())["expected_dice"]
-    low, high, actual = np.log2([1 - expected["high"], 1 - expected["low"], real_error(folder, out, structure) / 100])
-    return float(high - low + 20 * max(0, low - actual, actual - high))
+def of_real(kind):
+    """Names of the jobs of this kind (a constant of sensitivity_real.py); none without COVOL_DATA."""
+    return getattr(real, kind) if real else []
 
 
 # ---- jobs ----------------------------------------------------------------------------------------------------------
@@ -339,6 +298,8 @@ JOBS = {  # name: (arguments of covol, kind of truth, shape, file of the points 
     "normals plate": (RECONSTRUCT.format("normals_plate.csv"), "cloud", "plate"),
     "normals wrong": (RECONSTRUCT.format("normals_wrong.csv"), "cloud", "spikes"),
     "normals thin": (RECONSTRUCT.format("normals_thin.csv"), "cloud", "plate"),
+    "normals noisy": (RECONSTRUCT.format("normals_noisy.csv"), "cloud", "spikes"),
+    "needles": (RECONSTRUCT.format("needles.csv"), "cloud", "needles"),
     "normals random": (RECONSTRUCT.format("normals_random.csv"), "cloud", "torus"),
     "thick tag": (RECONSTRUCT.format("thick.csv").replace("cloud", "tag"), "cloud", "torus"),
     "spikes tag": (RECONSTRUCT.format("spikes1.csv").replace("cloud", "tag"), "cloud", "spikes"),
@@ -371,6 +332,8 @@ JOBS = {  # name: (arguments of covol, kind of truth, shape, file of the points 
     "m init": (MARKS.format("dense") + " --init sphere:0,0,0,1.1", "mask", "dense"),
     "m guess": (MARKS.format("torus").replace("p_torus.csv", "ten_torus.csv") + " --guess ../in/g_torus.nrrd", "mask", "torus"),
     "m guess seed": (MARKS.format("box").replace("p_box.csv", "ten_box.csv") + " --guess ../in/g_box.nrrd --inside -0.8,0,0", "mask", "box"),
+    **{f"m guess {name}": (f"segment ../in/p_bar.nrrd --points ../in/ten_bar.csv --guess ../in/g_{name}.nrrd -o s.vdb --mask m.nrrd --json r.json", "doubt", kind)
+       for name, kind in (("bar", "right"), ("bar_short", "wrong"))},
     "m guess round": (MARKS.format("round").replace("p_round.csv", "ten_round.csv") + " --guess ../in/g_round.nrrd", "mask", "round"),
     "m guess box": (MARKS.format("box").replace("p_box.csv", "ten_box.csv") + " --guess ../in/g_box.nrrd --rho 0", "mask", "box"),
     "m guess many": (MARKS.format("torus") + " --guess ../in/g_torus.nrrd --rho 0", "mask", "torus"),
@@ -382,6 +345,7 @@ JOBS = {  # name: (arguments of covol, kind of truth, shape, file of the points 
     "m scribbles": ("segment ../in/p_torus.nrrd --painted ../in/s_scribbles.nrrd -o s.vdb --mask m.nrrd", "mask", "torus"),
     "m grow torus": ("segment ../in/p_torus.nrrd --theta 0 --inside 0.75,0,0 -o s.vdb --mask m.nrrd", "mask", "torus"),
     "m grow two": ("segment ../in/p_two.nrrd --theta 0 --inside -0.55,0,0 -o s.vdb --mask m.nrrd", "mask", "two"),
+    "m grow faint": ("segment ../in/p_faint.nrrd --theta 0 --init sphere:0,0,0,0.25 -o s.vdb --mask m.nrrd", "mask", "sphere"),
     "m grow wide": ("segment ../in/p_sphere.nrrd --theta 0 --init sphere:0,0,0,1.15 -o s.vdb --mask m.nrrd", "mask", "sphere"),
     "m grow many": ("segment ../in/p_many.nrrd --theta 0 --inside 0,0.75,0 -o s.vdb --mask m.nrrd", "mask", "many"),
     **{f"m lapse {name}": (f"segment ../in/p_{name}.nrrd ../in/p_{name}_moved.nrrd --points ../in/p_{name}.csv -o s.vdb --mask m.nrrd", "lapse", f"{name}_moved")
@@ -391,38 +355,33 @@ JOBS = {  # name: (arguments of covol, kind of truth, shape, file of the points 
     "m contours": ("segment ../in/p_torus.nrrd --contours ../in/contours.csv -o s.vdb --mask m.nrrd", "mask", "torus"),
     "m contours alone": ("segment ../in/p_torus.nrrd --contours ../in/contours.csv --rho 0 -o s.vdb --mask m.nrrd", "mask", "torus"),
     "m painted": ("segment ../in/p_torus.nrrd --painted ../in/s_torus.nrrd -o s.vdb --mask m.nrrd", "mask", "torus"),
+    "m painted bar": ("segment ../in/p_bar.nrrd --painted ../in/s_bar.nrrd -o s.vdb --mask m.nrrd", "mask", "bar"),
     "m painted box": ("segment ../in/p_box.nrrd --painted ../in/s_box.nrrd --rho 0 -o s.vdb --mask m.nrrd", "mask", "box"),
 }
 # Lists of jobs for the steps in PLAN, the most informative job first.
-CLOUDS = ["spikes noisy", "plate noisy", "torus", "twins", "torus noisy", "hole", "spikes", "plate"]
+CLOUDS = ["spikes noisy", "plate noisy", "torus", "twins", "torus noisy", "needles", "hole", "spikes", "plate"]
 SCANS = ["front", "layers", "front sensor", "half open", "hole", "half flat"]
 GIVEN = ["normals", "normals plate", "normals wrong", "front sensor", "normals thin", "normals random", "half open", "twins"]
 TAGGED = ["m tag", "twins tag", "thick tag", "m tag slit", "m tag sphere", "spikes tag"]
 ALONE = ["m torus alone", "few", "m many alone", "m two", "m sides", "m contours alone"]
 GUESSED = ["m round", "m torus", "m two", "m box", "m sides", "m many"]
-CONTOURS = ["m contours", "m contours alone", "m painted", "m scribbles", "m line", "m painted box", "m contours sphere", "m painted round"]
+CONTOURS = ["m contours", "m contours alone", "m painted", "m scribbles", "m line", "m painted bar", "m painted box", "m contours sphere", "m painted round"]
 CORRECTED = ["m guess", "m guess large", "m guess seed", "m guess round", "m guess box", "m guess many", "m guess many round"]
-GROWN = ["m grow", "m grow box", "m grow torus", "m grow two", "m grow wide", "m grow many"]
+GROWN = ["m grow", "m grow box", "m grow torus", "m grow two", "m grow wide", "m grow faint", "m grow many"]
 LAPSES = [f"m lapse {name}" for name in MOVED]
 FLOWS = ["m paper", "m init", "m grow", "few", "m coarse", "m tag"]
 LINES = ["m line", "m line marks", "m line tag"]
 MESHES = ["relaxed", "adaptive", "spikes", "half open", "half flat", "torus"]
-REAL_OUTLINES = [f"{name} outlines" for name in OUTLINED] if os.environ.get("COVOL_DATA") else []
-REAL_JOBS = [real_name(name, count) for count in REAL_COUNTS for name in REAL] if os.environ.get("COVOL_DATA") else []
-REAL_FEW = [real_name(name, 20) for name in REAL[::2]] + [real_name(name, 60) for name in REAL[1::2]] if REAL_JOBS else []
-REAL_ALONE = [f"{real_name(name, 20)} alone" for name in ("spinal cord", "left atrium", "thalamus")] if REAL_JOBS else []
-REAL_ASTRAY = [f"{real_name(name, DOUBT_COUNT)} astray" for name in REAL[::4]] if REAL_JOBS else []
-DOUBTED = ["plate right", "folds right", "folds wrong", "torus right", *([doubt_name(name, kind) for name in REAL[::2] for kind in ("right", "wrong")] if REAL_JOBS else [])]
-REAL_EXPECTED = [f"{name} expected" for name in REAL_FEW]
+DOUBTED = ["plate right", "folds right", "folds wrong", "torus right", "m guess bar", "m guess bar_short", *of_real("DOUBTED")]
 PLAN = {  # step of a constant: the jobs in which it is varied
-    "common": ["m strays", "spikes noisy", "m torus", "m contours", "m tag", "front", "m grow box", "m guess", "plate", *REAL_FEW[:2]],
+    "common": ["m strays", "spikes noisy", "m torus", "m contours", "m tag", "front", "m grow box", "m guess", "plate", *of_real("FEW_MARKS")[:2]],
     **dict.fromkeys(("cloud", "cloud_scale", "stray", "filled", "indicator", "iteration", "propagation", "local_fit", "crease", "blend", "join_pieces"), CLOUDS),
-    "orientation": [*CLOUDS, "normals random"], **dict.fromkeys(("views", "layers"), SCANS), "given_sides": GIVEN,
+    "orientation": [*CLOUDS[:4], "normals noisy", *CLOUDS[4:]], **dict.fromkeys(("views", "layers"), SCANS), "given_sides": GIVEN,
     **dict.fromkeys(("tag_distance", "scan_noise"), TAGGED),
-    **dict.fromkeys(("guess", "marks_surface"), [*ALONE, *REAL_ALONE]), "correction": CORRECTED,
-    "guidance": GUESSED + REAL_FEW[:6] + LAPSES, "inference": [*REAL_FEW, *REAL_ASTRAY, *REAL_EXPECTED], "doubts": DOUBTED,
-    **dict.fromkeys(("contours", "outline"), [*CONTOURS, *REAL_OUTLINES[:1]]), "grow": GROWN, "time_lapse": LAPSES,
-    **dict.fromkeys(("edge", "evolve", "motion"), [*FLOWS, *LINES, "m contours"]), "flow": [*FLOWS[:3], "m line", "m contours sphere", *REAL_OUTLINES],
+    **dict.fromkeys(("guess", "marks_surface"), [*ALONE[:3], *of_real("MARKS_ALONE"), *ALONE[3:]]), "correction": CORRECTED + of_real("OF_GUESSES"),
+    "guidance": GUESSED + of_real("FEW_MARKS")[:6] + LAPSES, "inference": [name for kind in ("FEW_MARKS", "ASTRAY_MARKS", "EXPECTED_DICE", "OF_GUESSES") for name in of_real(kind)], "doubts": DOUBTED,
+    **dict.fromkeys(("contours", "outline"), [*CONTOURS, *of_real("OF_OUTLINES")[:1]]), "grow": GROWN, "time_lapse": LAPSES,
+    **dict.fromkeys(("edge", "evolve", "motion"), [*FLOWS, *LINES, "m contours"]), "flow": [*FLOWS[:3], "m line", "m contours sphere", *of_real("OF_OUTLINES")],
     "automatic": ["spikes noisy", "few", "few tag", "front", "thick tag", "m tag", "m init"], "starts": ["m tag", "m tag slit", "m guess", "hole", "m grow", "few"],
     **dict.fromkeys(("holes", "cut", "relax", "decimate"), MESHES),
 }
@@ -432,8 +391,8 @@ def make_inputs(folder, covol):
     folder.mkdir(parents=True)
     make_clouds(folder)
     make_phantoms(folder, covol)
-    if REAL_JOBS:
-        make_real(folder)
+    if real:
+        JOBS.update(real.make_real(folder))
     subprocess.run([covol, "reconstruct", "spikes1.csv", "--init", "cloud", "-o", "spikes.vdb"], cwd=folder, check=True, capture_output=True)
 
 
@@ -462,7 +421,7 @@ def error_of(job, folder, out):
     if kind == "doubt":
         return doubt_error(out, shape)
     if kind == "expected":
-        return expected_error(folder, out, shape)
+        return real.expected_error(folder, out, shape)
     if kind == "real":
-        return real_error(folder, out, shape)
+        return real.real_error(folder, out, shape)
     return cloud_error(folder, out, shape, np.genfromtxt(folder / more[0], delimiter=",", skip_header=1)[:, :3] if kind == "open" else None)

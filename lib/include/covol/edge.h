@@ -90,7 +90,7 @@ struct MarkedFeature {
 };
 
 /// Finds a line if the intensity at the marked positions differs from both sides by more than the sides differ from
-/// each other, and by more than three standard errors; else a slope.
+/// each other, and by more than four standard errors; else a slope.
 /// @param places   positions, world units
 /// @param normals  outward unit vectors, one for each position
 /// @param reach    distance from a position at which its two sides are sampled, world units

@@ -350,7 +350,7 @@ MarkedFeature detect_feature(const Image& image, const std::vector<Vec3>& places
     found.line = line / count;
     found.step = step / count;
     const double error = std::sqrt(std::max(0.0, squares / count - found.line * found.line) / (count - 1));
-    if (std::abs(found.line) > std::abs(found.step) && std::abs(found.line) > kEdge.standard_errors * error)
+    if (std::abs(found.line) > std::abs(found.step) && std::abs(found.line) > kCommon.errors * error)
         found.feature = found.line > 0 ? EdgeFeature::BrightLine : EdgeFeature::DarkLine;
     return found;
 }

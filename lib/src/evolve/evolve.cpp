@@ -42,6 +42,9 @@ bool has_active(const FloatGrid& u) {
 // Motion in a step, relative to the motion that counts as steady, below which a leaf becomes inactive, unless one of
 // the 26 leaves around it moves by more.
 constexpr double kInactiveFraction = 0.2;
+// Maximum automatic time step, in units of h: limits the condition number of the linear systems while the front hardly
+// moves.
+constexpr double kLargestTau = 10;
 
 // Limits of the step of check_step(): tau times the strongest weight. The coefficients of a row are stored as
 // fractions, accurate to half of 1/65535. With the smallest step, the motion is wrong by at most 1.5 %; with the
@@ -319,7 +322,7 @@ private:
     // by two changes of the time step in each direction, so that the time step does not alternate.
     void adapt_tau(double motion) {
         const double aim = kMotion.left_by / kCycle, margin = kCommon.growth * kCommon.growth;
-        if (motion < aim / margin) tau_ = std::min(tau_ * kCommon.growth, kEvolve.largest_tau);
+        if (motion < aim / margin) tau_ = std::min(tau_ * kCommon.growth, kLargestTau);
         if (motion > aim * margin) tau_ = std::max(tau_ / kCommon.growth, 1.0);
     }
 

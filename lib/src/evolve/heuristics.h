@@ -4,13 +4,6 @@
 
 namespace covol {
 
-/// Time steps: evolve.cpp.
-struct EvolveHeuristics {
-    /// [h] Maximum automatic time step.
-    double largest_tau = heuristic("evolve.largest_tau", 10.0);
-};
-COVOL_HEURISTICS EvolveHeuristics kEvolve{};
-
 /// The criterion for rebuilding a band around a moved surface: motion.cpp.
 struct MotionHeuristics {
     /// [voxels] Mean motion in a leaf at which the surface has left the band's middle.

@@ -122,7 +122,7 @@ std::map<const HalfSpace*, std::vector<Vec3>> by_face(const std::vector<Vec3>& m
 }
 
 /// Whether the nearest marks lie on all sides of `mark`: the angle between the directions to two successive ones, in
-/// the plane of the face, is always less than kGuess.way_out pi.
+/// the plane of the face, is always clearly less than pi, its value at a straight border of an area with marks.
 bool is_surrounded(const Vec3& mark, const std::vector<Vec3>& others, const HalfSpace& face) {
     const auto [u, v] = detail::directions_in(face);
     std::vector<std::array<double, 2>> around;  // of the other marks: squared distance and angle, in the face's plane
@@ -139,7 +139,7 @@ bool is_surrounded(const Vec3& mark, const std::vector<Vec3>& others, const Half
     double gap =
         directions.empty() ? 2 * std::numbers::pi : directions.front() + 2 * std::numbers::pi - directions.back();
     for (std::size_t n = 1; n < directions.size(); ++n) gap = std::max(gap, directions[n] - directions[n - 1]);
-    return gap < kGuess.way_out * std::numbers::pi;
+    return gap < (1 - kCommon.minority) * std::numbers::pi;
 }
 
 /// Whether the marks beside a face lie along a closed line instead of all over an area. They are then the outline of

@@ -225,7 +225,7 @@ std::vector<double> solve(const std::vector<Target>& targets, double radius, dou
 void add_bumps(std::vector<Bump>& bumps, const std::vector<Target>& targets, double min_radius, double precision) {
     std::vector<Target> met, open = targets;
     const auto radius_of = [&](double shift) {
-        return std::max(min_radius, (shift > 0 ? kCorrection.radius_outward : -kCorrection.radius_of_residual) * shift);
+        return std::max(min_radius, kCorrection.radius * std::abs(shift));
     };
     while (!open.empty()) {
         std::vector<double> left;

@@ -12,21 +12,15 @@ struct GuessHeuristics {
     /// of twice that size. The surface through marks on half a ball closes within an ellipsoid of size 2, and gets no
     /// constraints.
     double held_at = heuristic("guess.held_at", 1.5);
-    /// [pi] Minimum angle, in the plane of a cut, between the directions from a mark to two successive ones of its
-    /// nearest marks for which the mark counts as not surrounded. At a straight border of an area with marks it is pi.
-    double way_out = heuristic("guess.way_out", 5.0 / 6);
 };
 COVOL_HEURISTICS GuessHeuristics kGuess{};
 
 /// A guess corrected by marks: guess_correction.cpp.
 struct CorrectionHeuristics {
-    /// [distances between mark and guess] Radius of a bump that moves the guess inward. Above 2.11 the bump is less
-    /// steep than the guess's distance, so that the result remains monotone across the surface
-    /// (covol/guess_correction.h).
-    double radius_of_residual = heuristic("correction.radius_of_residual", 3.0);
-    /// [distances between mark and guess] Radius of a bump that moves the guess outward; a wide one inflates the
+    /// [distances between mark and guess] Radius of a bump. Above 2.11 the bump is less steep than the guess's distance,
+    /// so that the result remains monotone across the surface (covol/guess_correction.h). A wider one inflates the
     /// correct surface beside a missing part (tests/bench/marks/correction.py).
-    double radius_outward = heuristic("correction.radius_outward", 2.2);
+    double radius = heuristic("correction.radius", 2.2);
 };
 COVOL_HEURISTICS CorrectionHeuristics kCorrection{};
 

@@ -138,9 +138,8 @@ Choices with_flow(const Problem& problem, Choices c) {
     if (!c.evolve.tau)
         remarks.choose("tau", number(c.h), "1 voxel at unit speed; longer while the surface moves slowly", run);
     if (!c.edge.sigma && uses_image(c.evolve)) {
-        const double voxels = tags ? kAutomatic.tag_sigma_voxels : 1.0;
-        c.edge.sigma = voxels * c.h;
-        remarks.choose("sigma", number(*c.edge.sigma), number(voxels) + " voxels", run);
+        c.edge.sigma = c.h;
+        remarks.choose("sigma", number(c.h), "1 voxel", run);
     }
     if (!c.evolve.attraction_range)
         c.evolve.attraction_range = choose_attraction_range(c.evolve, tags, c.h, remarks, run);

@@ -24,8 +24,6 @@ struct AutomaticHeuristics {
     double max_facets = limit("automatic.max_facets", 20);
     /// [voxels] Weight of curvature after tagging, for contours and for a guess.
     double tag_delta_voxels = heuristic("automatic.tag_delta_voxels", 0.25);
-    /// [voxels] Presmoothing of the image after tagging.
-    double tag_sigma_voxels = heuristic("automatic.tag_sigma_voxels", 2.0);
 };
 COVOL_HEURISTICS AutomaticHeuristics kAutomatic{};
 

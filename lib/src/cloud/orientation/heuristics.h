@@ -55,8 +55,6 @@ struct OrientationHeuristics {
     double first_along = limit("orientation.first_along", 192);
     /// [points] Approximate maximum number of points that the iteration uses: limits the time.
     double max_sampled = limit("orientation.max_sampled", 100000);
-    /// [spacings] Distance between a point and the surface above which the surface counts as missing the point.
-    double passed_reach = heuristic("orientation.passed_reach", 1.5);
 };
 COVOL_HEURISTICS OrientationHeuristics kOrientation{};
 
@@ -91,11 +89,8 @@ struct ViewsHeuristics {
 };
 COVOL_HEURISTICS ViewsHeuristics kViews{};
 
-/// Layers of a scan below others: layers.cpp. Lengths are relative to the distance between sheets: the distance from
-/// which on points are not of one sheet.
+/// Layers of a scan below others: layers.cpp.
 struct LayersHeuristics {
-    /// [distances between sheets] Maximum depth of a layer below the one that hides it.
-    double farthest_layer = heuristic("layers.farthest_layer", 6);
     /// [patches] Maximum number of patches that are reversed tentatively; each requires a solution of the indicator.
     int max_patches = limit("layers.max_patches", 12);
 };

@@ -17,12 +17,14 @@ namespace {
 
 using Patch = std::vector<std::uint32_t>;  // indices of points
 
+/// Maximum distance between positions in two cells that share a face: the diagonal of both.
+double adjacent_within(double edge) { return std::sqrt(6.0) * edge; }
+
 /// Finds the cells whose mean free direction (free_directions()) forms an angle of more than 90 degrees with the sum of
-/// the mean free directions of the surrounding cells, those up to a distance of kLayers.farthest_layer * `between`.
-/// @param between  as in turn_layers(): distance from which on points are not of one sheet, world units
+/// the mean free directions of the adjacent cells.
 class Opposed {
 public:
-    Opposed(const PointCells& cells, const std::vector<Vec3>& free, double between)
+    Opposed(const PointCells& cells, const std::vector<Vec3>& free)
         : cells_(cells), opposed_(cells.cell_count()), beside_(cells.cell_count()) {
         std::vector<Vec3> places, frees;
         for (std::size_t c = 0; c < cells.cell_count(); ++c) {
@@ -30,7 +32,7 @@ public:
             frees.push_back(free[cells.order()[cells.cell(c).begin]]);  // that of the cell's first point
         }
         const PointCells near(places, cells.edge());
-        const double reach = kLayers.farthest_layer * between, touching = std::sqrt(6.0) * cells.edge();
+        const double reach = adjacent_within(cells.edge());
         tbb::parallel_for(std::size_t(0), places.size(), [&](std::size_t c) {
             std::vector<PointCells::Range> ranges;
             const Vec3& p = places[c];
@@ -40,8 +42,9 @@ public:
                 for (std::uint32_t at = range.begin; at < range.end; ++at) {
                     const Vec3 to = minus(near.sorted()[at], p);
                     const double squared = dot(to, to);
-                    if (squared <= reach * reach) sum = plus(sum, frees[near.order()[at]]);
-                    if (squared <= touching * touching) beside_[c].push_back(near.order()[at]);
+                    if (squared > reach * reach) continue;
+                    sum = plus(sum, frees[near.order()[at]]);
+                    beside_[c].push_back(near.order()[at]);
                 }
             opposed_[c] = dot(sum, frees[c]) < 0;
         });
@@ -100,7 +103,7 @@ std::vector<char> turn_layers(WindingField& field, const std::vector<Vec3>& poin
                               double between, Orientation& orientation, const RunContext& run) {
     std::vector<char> turned(points.size(), 0);
     const PointCells cells(points, kCloud.coarse * between);
-    std::vector<Patch> patches = Opposed(cells, free, between).patches();
+    std::vector<Patch> patches = Opposed(cells, free).patches();
     patches.resize(std::min<std::size_t>(patches.size(), kLayers.max_patches));
     const double cell = field.indicator().stack().cell();
     double bare = Level(field, cells).bare;
@@ -112,9 +115,9 @@ std::vector<char> turn_layers(WindingField& field, const std::vector<Vec3>& poin
         solve(now, points, orientation, kCyclesFromNothing, run);
         scale_to_half(now, points);
         const Level level(now, cells);
-        const PointCells surface(level.middles, kLayers.farthest_layer * between);
+        const PointCells surface(level.middles, cells.edge());
         const auto away = std::count_if(patch.begin(), patch.end(), [&](std::uint32_t n) {
-            return !surface.any_within(points[n], kLayers.farthest_layer * between);
+            return !surface.any_within(points[n], adjacent_within(cells.edge()));
         });
         double area = 0;
         for (const std::uint32_t n : patch) area += orientation.areas[n];
