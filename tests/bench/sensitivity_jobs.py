@@ -54,6 +54,7 @@ SHAPES = {
     # Two balls with a gap of 2 spacings of the points.
     "twins": union(ball((-0.62, 0, 0), 0.57), ball((0.62, 0, 0), 0.57)),
     "ball": ball((0, 0, 0), 1),
+    "rings": union(*[lambda p, c=c: torus(0.42, 0.13)(p - np.array(c)) for c in ((-0.5, -0.4, 0), (0.5, -0.4, 0), (0, 0.47, 0))]),
     # A ball with six needles that are as thick as the distance between the points.
     "needles": union(ball((0, 0, 0), 0.7), *[capsule((0, 0, 0), 1.4 * np.array(d) / np.linalg.norm(d), 0.04)
                                              for d in ((1, 0, 0), (0, 1, 0), (-1, 0.3, 0), (0, -1, 0.4), (0, 0, 1), (0.2, 0.1, -1))]),
@@ -200,13 +201,21 @@ def write_bar(folder, head):
     image = 60 + 100 * inside + np.random.default_rng(21).normal(0, 15, inside.shape)
     (folder / "p_bar.nrrd").write_bytes(head + image.clip(0, 255).astype("u1").tobytes())
     (folder / "l_bar.nrrd").write_bytes(head + inside.astype("u1").tobytes())
-    surface = np.argwhere(inside & ~ndimage.binary_erosion(inside) & (z > 0))
-    for name, end in (("bar", 0), ("bar_short", -0.3)):  # guesses that lack the half and two thirds of the bar, and marks there
-        (folder / f"g_{name}.nrrd").write_bytes(head + (inside & (z < end)).astype("u1").tobytes())
+    surface = np.argwhere(inside & ~ndimage.binary_erosion(inside) & (z > 0.8))
+    (folder / "g_bar.nrrd").write_bytes(head + (inside & (z < 0.58)).astype("u1").tobytes())  # lacks an end; the marks are there
     rim = np.random.default_rng(23).permutation(surface)[:10]
     write_points(folder / "ten_bar.csv", (rim[:, ::-1] - 21.5) * 2.6 / 44)
     inside[np.arange(44) % 6 != 3] = False
     (folder / "s_bar.nrrd").write_bytes(head + inside.astype("u1").tobytes())
+
+
+def write_handles(folder, head):
+    """Marks on three joined rings, and marks on a plate that are less precise than the plate is thick; an image that shows neither."""
+    (folder / "p_blank.nrrd").write_bytes(head + np.full(44 ** 3, 100, "u1").tobytes())
+    for name, count, noise in (("rings", 400, 0.01), ("plate", 60, 0.1)):
+        random = np.random.default_rng([count, 2])
+        points = on_surface(SHAPES[name], count, random)[0]
+        write_points(folder / f"handles_{name}.csv", points + random.normal(0, noise, points.shape))
 
 
 def write_faint_sphere(folder, head, labels):
@@ -238,6 +247,7 @@ def make_phantoms(folder, covol):
         if name == "torus":
             write_torus_lines(folder, raw)
             write_bar(folder, raw)
+            write_handles(folder, raw)
         if name == "sphere":
             write_faint_sphere(folder, raw, labels)
         points = np.array([line.split(",")[:3] for line in (folder / f"p_{name}.csv").read_text().splitlines() if line[0] in "-0123456789"], float)
@@ -332,8 +342,9 @@ JOBS = {  # name: (arguments of covol, kind of truth, shape, file of the points 
     "m init": (MARKS.format("dense") + " --init sphere:0,0,0,1.1", "mask", "dense"),
     "m guess": (MARKS.format("torus").replace("p_torus.csv", "ten_torus.csv") + " --guess ../in/g_torus.nrrd", "mask", "torus"),
     "m guess seed": (MARKS.format("box").replace("p_box.csv", "ten_box.csv") + " --guess ../in/g_box.nrrd --inside -0.8,0,0", "mask", "box"),
-    **{f"m guess {name}": (f"segment ../in/p_bar.nrrd --points ../in/ten_bar.csv --guess ../in/g_{name}.nrrd -o s.vdb --mask m.nrrd --json r.json", "doubt", kind)
-       for name, kind in (("bar", "right"), ("bar_short", "wrong"))},
+    "m guess bar": ("segment ../in/p_bar.nrrd --points ../in/ten_bar.csv --guess ../in/g_bar.nrrd --rho 0 -o s.vdb --mask m.nrrd --json r.json", "doubt", "right"),
+    **{f"m handles {name}": (f"segment ../in/p_blank.nrrd --points ../in/handles_{name}.csv --rho 0 -o s.vdb --mask m.nrrd --json r.json", "doubt", kind)
+       for name, kind in (("rings", "right"), ("plate", "wrong"))},
     "m guess round": (MARKS.format("round").replace("p_round.csv", "ten_round.csv") + " --guess ../in/g_round.nrrd", "mask", "round"),
     "m guess box": (MARKS.format("box").replace("p_box.csv", "ten_box.csv") + " --guess ../in/g_box.nrrd --rho 0", "mask", "box"),
     "m guess many": (MARKS.format("torus") + " --guess ../in/g_torus.nrrd --rho 0", "mask", "torus"),
@@ -372,7 +383,7 @@ LAPSES = [f"m lapse {name}" for name in MOVED]
 FLOWS = ["m paper", "m init", "m grow", "few", "m coarse", "m tag"]
 LINES = ["m line", "m line marks", "m line tag"]
 MESHES = ["relaxed", "adaptive", "spikes", "half open", "half flat", "torus"]
-DOUBTED = ["plate right", "folds right", "folds wrong", "torus right", "m guess bar", "m guess bar_short", *of_real("DOUBTED")]
+DOUBTED = ["plate right", "folds right", "folds wrong", "torus right", "m guess bar", "m handles rings", "m handles plate", *of_real("DOUBTED")]
 PLAN = {  # step of a constant: the jobs in which it is varied
     "common": ["m strays", "spikes noisy", "m torus", "m contours", "m tag", "front", "m grow box", "m guess", "plate", *of_real("FEW_MARKS")[:2]],
     **dict.fromkeys(("cloud", "cloud_scale", "stray", "filled", "indicator", "iteration", "propagation", "local_fit", "crease", "blend", "join_pieces"), CLOUDS),
