@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <vector>
 
-// A second implementation of covol's scheme, Eqs. (14)-(17) and (19)-(22): naive, dense and in double precision. It has
+// A second implementation of covol's scheme, Eqs. (13)-(17) and (19)-(22): naive, dense and in double precision. It has
 // no code in common with covol, so that agreement of the two confirms the equations. Voxels are cells of edge h; an
 // inactive voxel keeps its value; the domain's boundary is homogeneous Neumann, by a layer of ghost voxels that mirror
 // the layer inside.

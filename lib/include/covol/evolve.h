@@ -119,7 +119,7 @@ struct EvolveFields {
 };
 
 /// Moves the level set u to the boundary of the segment by the semi-implicit co-volume scheme with upwinding, Eqs.
-/// (14)-(22), on u's active voxels.
+/// (13)-(17) and (19)-(22), on u's active voxels.
 ///
 /// @param u  in/out, world units; active voxels are the band; u < 0 inside; inactive voxels keep their values.
 /// @pre   all grids share one transform: uniform voxel size and a translation (domain_of()).

@@ -17,8 +17,9 @@ struct IntensityStatistics {
 /// The number of the image's voxels in the bounding box of a surface.
 [[nodiscard]] COVOL_API double count_voxels_around(const Image& image, const FloatGrid& surface);
 
+/// Measures the image inside a surface. Only a few slices of the image are read at a time.
 /// @param surface  a level set, negative inside
-/// @throws Error Cancelled; for an image in chunks as Image::load().
+/// @throws Error Cancelled; also as for Image::load(), if the image is in chunks.
 [[nodiscard]] COVOL_API IntensityStatistics measure_intensity(const Image& image, const FloatGrid& surface,
                                                               const RunContext& run = {});
 

@@ -125,10 +125,12 @@ struct CloudOrientation {
 /// neighbours or, if neighbours do not agree, each normal points to the side from which its point can be seen. If the
 /// points fill a solid, so that no neighbourhood is a sheet, the indicator is their density.
 [[nodiscard]] COVOL_API CloudOrientation orient_cloud(const std::vector<Vec3>& points, const RunContext& run = {});
-/// Orients a cloud with hints, which are used if they are consistent: half of them has to predict the sides of the
-/// other half, and if the orientation without hints converges, they must not contradict it in whole regions. Otherwise
-/// the cloud is oriented without them.
-/// From a sensor direction, a point gets the normal of its local plane on the side that was seen.
+/// Orients a cloud with hints if they are consistent, else without them. At least half of the points must have hints,
+/// and one half of the hints has to predict the sides of the other half. If neighbouring normals still contradict each
+/// other, or normals contradict their indicator, the cloud is also oriented without hints. Hints that contradict this
+/// orientation in whole regions are not used if it encloses a solid, if its surface misses no more points than theirs,
+/// and if they have identified no points inside the solid.
+/// A sensor direction gives a point the normal of its local plane, on the side that was seen.
 /// @throws Error also InvalidInput (a list of hints that is neither empty nor as long as `points`)
 [[nodiscard]] COVOL_API CloudOrientation orient_cloud(const std::vector<Vec3>& points, const PointHints& hints,
                                                       const RunContext& run = {});

@@ -66,8 +66,8 @@ struct SeparateResult {
                                                 const SeparateOptions& options = {}, const RunContext& run = {});
 
 /// Label image in the given geometry (i fastest): n + 1 in voxels whose centre lies in structures[n], else 0.
-/// A centre that lies in two solids due to rounding, or in none between two that touch, belongs to the nearer solid (at
-/// equal distances, to the one whose name comes first).
+/// If solids overlap at a centre, or if it lies in no solid but between two that touch, the voxel belongs to the solid
+/// with the smallest signed distance there (at equal distances, to the one whose name comes first).
 /// @throws Error InvalidInput (more than 254 structures).
 [[nodiscard]] COVOL_API std::vector<std::uint8_t> make_label_image(const std::vector<Structure>& structures,
                                                                    const ImageGeometry& geometry,

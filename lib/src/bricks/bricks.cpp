@@ -374,8 +374,8 @@ SegmentResult BrickJob::join(const BrickPlan& plan, const BrickStates& states, b
         if (!parts_->field) surface = parts_->join_surfaces(plan, states, solution);
         if (solution.solve.leaf_count == 0)
             throw Error(Errc::InvalidInput,
-                        "bricks: the surface vanished in all bricks; lower `delta`, or start closer to the edges "
-                        "(`init`)",
+                        "bricks: the surface vanished in all bricks; lower `delta`, or start closer to the points or "
+                        "edges (`init`)",
                         "delta");
         solution.report.remarks.choose("bricks", std::to_string(plan.bricks.size()), "solved separately and joined",
                                        run);

@@ -21,8 +21,9 @@ namespace covol::detail {
 class SectionField {
 public:
     /// @param sections  at least one, each with a polygon
-    /// @param h         distance of the lattice's nodes, world units; a multiple of it if there would be too many nodes
-    /// @param origin    a position on that lattice
+    /// @param h         world units. The distance between neighbouring nodes of the lattice is h, or a multiple of h if
+    ///     the lattice would otherwise have too many nodes or cross the planes too often
+    /// @param origin    the lattice begins at a distance from it that is a multiple of h along each axis
     /// @throws Error Cancelled.
     SectionField(const std::vector<Section>& sections, double h, const Vec3& origin, const RunContext& run);
 

@@ -14,9 +14,9 @@
 namespace covol::detail {
 
 /// The linear system of one band: u_p + Σ_q a_pq (u_q - u_p) = u_p^{n-1}, a_pq = (τ/h³) min(v_pq, 0) - (τδ/h²) M_p W_pq
-/// <= 0, Eqs. (14)-(22). One step assembles the rows of every leaf from u^{n-1}, then visits the leaves in two colours,
-/// starting from 2 u^{n-1} - u^{n-2}, until the residual is `solver_tolerance` times that of u^{n-1}. Values are in
-/// voxels, not world units.
+/// <= 0, Eqs. (13)-(17), (19)-(22); docs/method.md defines v_pq, M_p and W_pq. One step assembles the rows of every
+/// leaf from u^{n-1}, then visits the leaves in two colours, starting from 2 u^{n-1} - u^{n-2}, until the residual is
+/// `solver_tolerance` times that of u^{n-1}. Values are in voxels, not world units.
 ///
 /// Work is done on active leaves only: a leaf becomes inactive once neither it nor any of the 26 around it has moved by
 /// more than a threshold, and active again once one of those has. Within a solve, a leaf is not visited again if it and
@@ -44,8 +44,9 @@ public:
     };
     /// Moves the states out of the solver, which cannot be used afterwards.
     [[nodiscard]] LeafStates take_leaf_states();
-    /// Leaves that were inactive in the previous band stay inactive.
-    /// @param changed  sorted origins of leaves whose values differ from those of the previous band
+    /// Takes over the states of leaves from the previous band, so that inactive leaves stay inactive. Leaves that are
+    /// new, or whose values have changed, are active.
+    /// @param changed  sorted origins of the leaves whose values differ from those of the previous band
     void keep_inactive(const LeafStates& old, const std::vector<Coord>& changed);
 
     /// Writes or reads everything that steps have changed. When it is read, the band has to be that of the solver that

@@ -1,7 +1,8 @@
 // The semi-implicit co-volume scheme of Kósa, Mikula et al., "3D image segmentation supported by a point cloud",
-// Eqs. (14)-(22), on the active voxels of a narrow band:
+// Eqs. (13)-(17), (19)-(22), on the active voxels of a narrow band:
 //   u_p + Σ_q a_pq (u_q - u_p) = u_p^{n-1},   a_pq = (τ/h³) min(v_pq, 0) - (τδ/h²) M_p W_pq <= 0.
-// This is the loop over time; a step is in band_solver.cpp, the arithmetic on a leaf in scheme/scheme_kernels.cpp.
+// docs/method.md, "The model", defines v_pq, M_p and W_pq. This is the loop over time; a step is in band_solver.cpp,
+// the arithmetic on a leaf in scheme/scheme_kernels.cpp.
 #include "covol/evolve.h"
 
 #include <openvdb/openvdb.h>

@@ -54,10 +54,10 @@ FolderLock::FolderLock(const fs::path& folder, const RunContext& run, std::chron
         run.check();
         const auto waited = std::chrono::duration_cast<std::chrono::milliseconds>(Clock::now() - begin);
         if (waited >= patience)
-            throw Error(Errc::Io, folder.string() + ": cannot write: " + holder_of(id()) +
-                                      " has held a lock (flock) on this folder for " +
-                                      std::to_string((waited.count() + 500) / 1000) +
-                                      " s; expected it to be free; end that program, or choose another folder");
+            throw Error(Errc::Io, folder.string() + ": cannot write: waited " +
+                                      std::to_string((waited.count() + 500) / 1000) + " s for " + holder_of(id()) +
+                                      ", which holds a lock (flock) on this folder; end that program, or choose "
+                                      "another folder");
         if (waited >= kUntilReported && !reported) {
             run.info(folder.string() + ": waiting for " + holder_of(id()) +
                      ", which holds a lock (flock) on this folder");

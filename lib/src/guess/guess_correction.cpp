@@ -224,9 +224,7 @@ std::vector<double> solve(const std::vector<Target>& targets, double radius, dou
 /// Adds bumps until their sum at each target is its shift, starting with the targets with the largest shifts.
 void add_bumps(std::vector<Bump>& bumps, const std::vector<Target>& targets, double min_radius, double precision) {
     std::vector<Target> met, open = targets;
-    const auto radius_of = [&](double shift) {
-        return std::max(min_radius, kCorrection.radius * std::abs(shift));
-    };
+    const auto radius_of = [&](double shift) { return std::max(min_radius, kCorrection.radius * std::abs(shift)); };
     while (!open.empty()) {
         std::vector<double> left;
         double radius = min_radius;
@@ -299,7 +297,8 @@ struct GuessCorrection::Data {
     std::vector<Bump> bumps;
     CorrectionReport report;
 
-    /// The leaf at `origin` after the correction; null if the correction does not change it.
+    /// The leaf at `origin` after the correction; null if it is so far from the surface that the correction cannot
+    /// change it.
     /// @param tree  of the guess: a signed distance that is clamped to plus or minus `clamp`
     [[nodiscard]] std::unique_ptr<Leaf> corrected_leaf(const FloatGrid::TreeType& tree, const openvdb::Coord& origin,
                                                        const Domain& domain, double clamp) const;

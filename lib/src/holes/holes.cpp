@@ -157,26 +157,25 @@ private:
     double distance_, reach_;
 };
 
-void check(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack,
-           const char* function) {
+void check(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack) {
     if (to_points.size() != mesh.vertices.size())
-        throw Error(Errc::InvalidInput, std::string(function) + ": expected a distance for each of " +
+        throw Error(Errc::InvalidInput, "expected the distance to the points for each of " +
                                             std::to_string(mesh.vertices.size()) + " vertices, got " +
                                             std::to_string(to_points.size()));
     if (!(distance > 0) || !(slack >= 0) || !(slack < distance))
-        throw Error(Errc::InvalidOptions, std::string(function) + ": expected 0 <= slack < distance, got " +
-                                              std::to_string(slack) + " and " + std::to_string(distance));
+        throw Error(Errc::InvalidOptions, "expected 0 <= slack < distance, got " + std::to_string(slack) + " and " +
+                                              std::to_string(distance));
 }
 
 holes::CutMesh cut_holes(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack,
-                         HolesReport& report, const RunContext& run, const char* function) {
-    check(mesh, to_points, distance, slack, function);
+                         HolesReport& report, const RunContext& run) {
+    check(mesh, to_points, distance, slack);
     holes::CutMesh cut;
     with_threads(run, [&] { cut = HoleFinder(mesh, to_points, distance, slack).find(report, run); });
     if (std::find(cut.kept.begin(), cut.kept.end(), 1) == cut.kept.end())
-        throw Error(Errc::InvalidInput, std::string(function) + ": no part of the surface lies within " +
-                                            std::to_string(distance) +
-                                            " of the points, so all of it would be a hole; use a larger distance");
+        throw Error(Errc::InvalidInput,
+                    "no part of the surface lies within " + std::to_string(distance) +
+                        " of the points, so all of it would be a hole; use a larger `hole_distance`");
     return cut;
 }
 
@@ -239,7 +238,7 @@ std::vector<BoundaryLoop> find_boundary_loops(const TriangleMesh& mesh) {
 TreatedHoles trim_holes(const TriangleMesh& mesh, const std::vector<float>& to_points, double distance, double slack,
                         const RunContext& run) {
     HolesReport report;
-    const holes::CutMesh cut = cut_holes(mesh, to_points, distance, slack, report, run, "trim_holes");
+    const holes::CutMesh cut = cut_holes(mesh, to_points, distance, slack, report, run);
     report.policy = Holes::Open;
     return {report.fraction > 0 ? holes::kept_part(cut) : mesh, std::move(report)};
 }
@@ -248,7 +247,7 @@ TreatedHoles flatten_holes(const TriangleMesh& mesh, const std::vector<float>& t
                            const RunContext& run) {
     TreatedHoles treated;
     auto& [result, report] = treated;
-    holes::CutMesh cut = cut_holes(mesh, to_points, distance, slack, report, run, "flatten_holes");
+    holes::CutMesh cut = cut_holes(mesh, to_points, distance, slack, report, run);
     with_threads(run, [&, &result = result] {
         std::vector<char> fixed(cut.mesh.vertices.size(), 0), spans(cut.mesh.vertices.size(), 0);
         for (std::size_t t = 0; t < cut.kept.size(); ++t)

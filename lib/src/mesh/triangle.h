@@ -23,8 +23,8 @@ inline Position to_position(const Vec3& p) { return {float(p[0]), float(p[1]), f
 inline std::uint32_t corner_count(std::uint64_t triangles) {
     constexpr std::uint64_t kMax = (~std::uint32_t(0)) / 3;
     if (triangles > kMax)
-        throw Error(Errc::Unsupported, "the mesh has " + std::to_string(triangles) + " triangles, expected at most " +
-                                           std::to_string(kMax) + "; use a larger voxel size");
+        throw Error(Errc::Unsupported, "expected at most " + std::to_string(kMax) + " triangles, got " +
+                                           std::to_string(triangles) + "; use a larger voxel size");
     return static_cast<std::uint32_t>(3 * triangles);
 }
 

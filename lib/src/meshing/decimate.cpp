@@ -221,8 +221,8 @@ private:
 
     [[nodiscard]] Vec3 at(std::uint32_t v) const { return to_vec3(mesh_->vertices[v]); }
 
-    /// The factor by which the shapes of the changed triangles increase the cost of the collapse; infinite if one of
-    /// them turns over.
+    /// The factor by which the shapes of the changed triangles increase the cost of the collapse. It is infinite if one
+    /// of them turns by more than the angle of kCommon.turn or becomes too thin: see kNeedles.
     [[nodiscard]] float shape_factor(std::uint32_t lost) const {
         const Vec3 from = at(lost);
         double worst = -1;

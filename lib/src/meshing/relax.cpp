@@ -202,7 +202,7 @@ private:
         return there;
     }
 
-    /// Whether a move turns the triangle over or moves it off the surface.
+    /// Whether a move turns the triangle by more than the angle of kCommon.turn, or moves it off the surface.
     [[nodiscard]] bool is_invalid_move(const Triangle& t, const Positions& before, const Positions& after) const {
         if (is_turned(t, before, after, kCommon.turn)) return true;
         return tolerance_ > 0 && has_moved(t, before, after) &&
@@ -213,7 +213,8 @@ private:
         return face == 0 && levels_.local().is_farther(a, b, c, tolerance_);
     }
 
-    /// Moves all chosen vertices by one step, except those whose triangles would turn over or leave the surface.
+    /// Moves all chosen vertices by one step, except those whose triangles would turn by more than the angle of
+    /// kCommon.turn or leave the surface.
     void move() {
         Positions next = mesh_.vertices;
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices_.size(), 512), [&](const auto& range) {

@@ -9,7 +9,7 @@
 #include "mesh/corner_table.h"
 #include "meshing/contacts.h"
 
-// Moves of vertices that are undone if triangles turn over or touch.
+// Moves of vertices that are undone if triangles turn too far or touch.
 namespace covol::meshing {
 
 /// Whether a corner of the triangle has moved.
@@ -52,8 +52,9 @@ std::vector<std::uint32_t> restore_all(const CornerTable& table, const std::vect
     return all;
 }
 
-/// Moves all vertices to `goal`, except those whose triangles would turn over or touch others that they did not touch
-/// before. @return the number of vertices that do not move. @throws Error InvalidInput (a mesh that is not manifold)
+/// Moves all vertices to `goal`, except those whose triangles would turn by more than the angle of kCommon.turn or
+/// touch others that they did not touch before. @return the number of vertices that do not move. @throws Error
+/// InvalidInput (a mesh that is not manifold)
 std::size_t move_where_free(TriangleMesh& mesh, const Positions& goal);
 
 }  // namespace covol::meshing

@@ -11,8 +11,9 @@
 namespace covol::figure {
 namespace {
 
-/// The extent of the centres of the voxels that are within a voxel of the surface. add(centre, extent) must enlarge the
-/// extent such that it contains the centre.
+/// The extent of the surface: calls add(centre, extent) for the centre of each active voxel within a voxel of the
+/// surface, in world coordinates. `add` converts the centre to the coordinates of the extent, and enlarges the extent
+/// such that it contains the result. @throws Error InvalidInput if there is no such voxel
 template <typename Add>
 Extent extent_of(const FloatGrid& grid, const Add& add) {
     const openvdb::tree::LeafManager<const FloatGrid::TreeType> leaves(grid.tree());

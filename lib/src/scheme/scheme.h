@@ -62,7 +62,7 @@ struct RowFacts {
 struct SchemeKernels {
     const char* name;  ///< "avx2", ...
 
-    /// Coefficients from u^{n-1}: Eqs. (13)-(17), (19)-(22) of the paper (see evolve.cpp), divided by the row's
+    /// Coefficients from u^{n-1}: Eqs. (13)-(17), (19)-(22) of the paper (see docs/method.md), divided by the row's
     /// diagonal, c[q] = -a_pq / a_pp >= 0, so that a row is u_p = b_p + Σ_q c[q] (u_q - b_p), b = u^{n-1}. Each c is
     /// accurate to half of 1/kFractionUnit, and their sum is less than 1.
     /// @param u      padded, with edges and corners

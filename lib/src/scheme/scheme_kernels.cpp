@@ -150,7 +150,7 @@ struct Star {
 };
 
 // Adds the attraction by points to velocity[f] = v_pq / h² for each face f; the next function adds that by the image.
-// Eqs. (17), (20) of the paper (see evolve.cpp).
+// Eqs. (17), (20) of the paper (see docs/method.md).
 inline void add_point_attraction(const Star& phi, float theta, Lanes velocity[6]) {
     for (int f = 0; f < 6; ++f) velocity[f] -= theta * phi.difference(f);
 }

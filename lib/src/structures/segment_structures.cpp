@@ -42,7 +42,7 @@ FloatGridPtr around(const FloatGrid& surface) {
 
 /// The distance from a mark up to which the surface of minimum bending energy is accurate to a quarter of a voxel of
 /// the image: at a distance d its error is kGuide.fraction_of_sagitta d^2 / (2 R), where R is the radius of a ball with
-/// the body's ratio of volume to area.
+/// the body's ratio of volume to area. It is at least one voxel of the image.
 double reach_of_marks(const SegmentResult& result, const Image& image) {
     const MeshMeasures& body = result.report.surface;
     const double radius = body.area > 0 ? 3 * std::abs(body.volume) / body.area : 0;

@@ -85,7 +85,7 @@ BrickCall run_call(Words& words, const CLI::App& program) {
     for (; end < words.size() && !is_option(words[end]); ++end) {
         std::size_t brick = 0;
         if (!parse_whole(words[end], brick))
-            throw UsageError("brick run: expected numbers of bricks, got " + words[end]);
+            throw UsageError("brick run: expected brick numbers (0, 1, ...), got " + words[end]);
         call.bricks.push_back(brick);
     }
     const CLI::App* command = nullptr;

@@ -55,7 +55,7 @@ struct EvolveJob {
         session.note(std::to_string(result.steps) + " steps, " + to_string(result.stop_reason));
         if (result.stop_reason == StopReason::Vanished)
             session.warn("the surface vanished after " + std::to_string(result.steps) +
-                         " steps; lower --delta, or start closer to the edges");
+                         " steps; lower --delta, or start closer to the points or edges");
         else if (result.stop_reason != StopReason::Steady)
             session.warn("not steady after " + std::to_string(result.steps) +
                          " steps; increase --max-steps to continue until the surface is steady");

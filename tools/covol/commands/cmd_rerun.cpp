@@ -189,7 +189,7 @@ private:
 
 /// The job with the current locations of its inputs. Its .vdb outputs are placed in `folder`; the others are omitted,
 /// together with the settings that are invalid without a mesh.
-/// @throws Error for options that a file may not set
+/// @throws Error for options that a file may not set, and if the job makes no .vdb
 JobOptions job_here(const std::string& path, const JobOptions& given, const CLI::App& command, const Inputs& inputs,
                     const fs::path& folder) {
     JobOptions job{given.command, {}};
@@ -258,10 +258,10 @@ struct RerunJob {
     void run(Session& session) const {
         const Provenance made = read_provenance(path);
         if (made.version != version())
-            session.warn(path + ": it was written by covol " + made.version + ", this is " + version() +
+            session.warn(path + ": it was written by covol " + made.version + ", but this is " + version() +
                          ": results may differ");
         if (made.instruction_set != instruction_set())
-            session.warn(path + ": it was made with " + made.instruction_set + ", this processor has " +
+            session.warn(path + ": it was made with " + made.instruction_set + ", but this run uses " +
                          instruction_set() + ": values may differ by 1e-4 voxels (COVOL_SIMD=" + made.instruction_set +
                          " selects that one if the processor supports it)");
         std::vector<std::string> places = folders;

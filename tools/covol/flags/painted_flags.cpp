@@ -21,7 +21,8 @@ std::vector<std::shared_ptr<const PaintedImage>> PaintedFlags::read(const RunCon
         PaintedImage painted = make_painted(read_image(named.value, {}, silent), options);
         if (!named.name.empty() && painted.labels.size() > 1)
             throw UsageError("--painted: " + text + ": expected one label in a file with a name, got " +
-                             std::to_string(painted.labels.size()) + "; leave the name out, each label is a structure");
+                             std::to_string(painted.labels.size()) +
+                             "; leave the name out, because each label is a structure");
         painted.name = named.name;
         images.push_back(std::make_shared<const PaintedImage>(std::move(painted)));
     }

@@ -121,7 +121,7 @@ StudyAction import_points(const std::string& file, StudyId structure, const Imag
     const PointCloud& cloud = given.cloud;
     if (cloud.points.size() > kMaxImported)
         throw Error(Errc::InvalidInput, "import: " + file + ": contains " + std::to_string(cloud.points.size()) +
-                                            " marks, a study accepts at most " + std::to_string(kMaxImported) +
+                                            " marks, but a study accepts at most " + std::to_string(kMaxImported) +
                                             " from a file; covol segment --points uses all");
     check_inside(cloud, image, run);
     const std::vector<Vec3> world = to_world(cloud, image);

@@ -92,7 +92,7 @@ private:
             at = last + 1;
             if (take(words_of(line, between))) end_ = at;
         }
-        if (version_ == 0) throw damaged("expected ics_version 1.0 or 2.0 in its first line");
+        if (version_ == 0) throw damaged("expected ics_version 1.0 or 2.0 in the line after the two separators");
     }
 
     static std::vector<std::string> words_of(string_view line, char between) {
@@ -110,7 +110,7 @@ private:
     bool take(std::vector<std::string> words) {
         if (version_ == 0) {
             if (words.size() < 2 || lower(words[0]) != "ics_version" || (words[1] != "1.0" && words[1] != "2.0"))
-                throw damaged("expected ics_version 1.0 or 2.0 in its first line");
+                throw damaged("expected ics_version 1.0 or 2.0 in the line after the two separators");
             version_ = words[1] == "1.0" ? 1 : 2;
             return false;
         }
@@ -154,7 +154,7 @@ IcsAxes axes_of(const std::string& path, const IcsHeader& header) {
     if (count < 2 || names.size() < count || texts.size() < count)
         throw header.damaged("expected a name and a size for each axis in its layout, got " +
                              std::to_string(names.size()) + " names and " + std::to_string(texts.size()) + " sizes" +
-                             (stated.empty() ? "" : " for the parameters " + quote(stated)));
+                             (stated.empty() ? "" : ", and " + quote(stated) + " as the number of axes"));
     std::vector<std::uint64_t> sizes;
     for (std::size_t n = 0; n < count; ++n) {
         const auto size = to_number<std::uint64_t>(texts[n]);

@@ -69,8 +69,9 @@ public:
         for (const auto& [first, count] : {std::pair(nifti::kPixdim, 4), std::pair(nifti::kQuatern, 6 + 12)})
             for (int n = 0; n < count; ++n)
                 if (!(std::abs(number(first + 4 * std::size_t(n))) < 1e9))
-                    throw Error(Errc::InvalidInput,
-                                unusable + " (a spacing, origin or direction is not finite, or huge)");
+                    throw Error(
+                        Errc::InvalidInput,
+                        unusable + " (expected a spacing, an origin and a direction of finite numbers below 1e9)");
         if (dimensions() < 1 || dimensions() > 7) throw Error(Errc::InvalidInput, unusable);
         for (int a = 0; a < dimensions(); ++a)
             if (integer(kDim + 2 + 2 * std::size_t(a)) < 0) throw Error(Errc::InvalidInput, unusable);

@@ -166,7 +166,7 @@ private:
         }
         if (!element.properties.empty() && element.count > room / minimum)
             source_.fail("the header promises " + std::to_string(element.count) + " of element " + quote(element.name) +
-                         ", the file has room for at most " + std::to_string(room / minimum) + "; it is truncated");
+                         ", but the file has room for at most " + std::to_string(room / minimum) + "; it is truncated");
     }
 
     [[noreturn]] void fail_cut_off(const PlyElement& element, std::uint64_t got) const {
@@ -299,7 +299,7 @@ private:
             normal[a] = element.number_named("n" + name);
             if (position[a] == element.properties.size())
                 source_.fail("expected a vertex property '" + name +
-                             "' of one number, the vertices have no property '" + name + "' of that kind");
+                             "' of one number, but the vertices have no property '" + name + "' of that kind");
             wanted = std::max(wanted, position[a] + 1);
         }
         const std::size_t last_normal = *std::max_element(normal.begin(), normal.end());
@@ -352,7 +352,7 @@ void write_ply_header(Output& out, const PlyCounts& counts, bool is_far, const s
     // Many readers store vertex indices and the number of faces as int.
     constexpr std::uint64_t kMax = std::numeric_limits<std::int32_t>::max();
     if (counts.vertices > kMax || counts.triangles > kMax)
-        throw Error(Errc::Unsupported, "PLY holds at most 2^31 - 1 vertices and faces, the mesh has " +
+        throw Error(Errc::Unsupported, "PLY holds at most 2^31 - 1 vertices and faces, but the mesh has " +
                                            std::to_string(counts.vertices) + " and " +
                                            std::to_string(counts.triangles) + "; decimate it or use larger voxels");
     out << "ply\nformat " << (binary ? "binary_little_endian" : "ascii") << " 1.0\n";

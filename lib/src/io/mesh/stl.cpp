@@ -88,7 +88,7 @@ TriangleMesh read_stl(Source& source, std::string_view text) {
 
 void write_stl_header(Output& out, std::uint64_t triangles, const std::vector<std::string>& comments) {
     if (triangles > std::numeric_limits<std::uint32_t>::max())
-        throw Error(Errc::Unsupported, "STL holds at most 2^32 - 1 triangles, the mesh has " +
+        throw Error(Errc::Unsupported, "STL holds at most 2^32 - 1 triangles, but the mesh has " +
                                            std::to_string(triangles) + "; decimate it or use larger voxels");
     // The header must not begin with "solid", because readers would take the file for ASCII.
     std::array<char, 80> header{};

@@ -77,8 +77,8 @@ InflateIndex::InflateIndex(std::string path, std::uint64_t offset, std::uint64_t
     places_.push_back(std::move(begin));
     std::uint64_t packed = 0, done = 0, reported = 0;
     bool first = true, ended = false;
-    // After the last requested byte, decompression continues to the end of the stream, where zlib verifies the
-    // checksum. A file that ends before the checksum is accepted.
+    // If `to_the_end` is set, decompression continues after the last requested byte to the end of the stream, where
+    // zlib verifies the checksum. A file that ends before the checksum is accepted.
     while (done < unpacked || (to_the_end && !ended)) {
         if (stream.avail_in == 0) {
             run.check();

@@ -8,9 +8,9 @@
 namespace covol::detail {
 namespace {
 
-// Size of a brick in voxels. It has few slices because reading a brick decompresses each of its slices, up to the last
-// row of the brick, as a whole.
-constexpr Index3 kBrick{64, 64, 16};
+// Maximum size of a chunk in voxels. It has few slices because reading a chunk decompresses each of its slices, up to
+// the last row of the chunk, as a whole.
+constexpr Index3 kMaxChunk{64, 64, 16};
 
 class PackedChunks : public ChunkSource {
 public:
@@ -67,7 +67,7 @@ private:
 }  // namespace
 
 Index3 packed_chunk_size(const Index3& size) {
-    return {std::min(size[0], kBrick[0]), std::min(size[1], kBrick[1]), std::min(size[2], kBrick[2])};
+    return {std::min(size[0], kMaxChunk[0]), std::min(size[1], kMaxChunk[1]), std::min(size[2], kMaxChunk[2])};
 }
 
 std::shared_ptr<const ChunkSource> packed_chunks(const std::string& path, const PixelPlace& place,

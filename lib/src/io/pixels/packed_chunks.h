@@ -20,9 +20,9 @@ struct PackedFrame {
 /// The size in voxels of the chunks into which an image of this size is divided.
 Index3 packed_chunk_size(const Index3& size);
 
-/// Bricks of a compressed frame, decoded in layers of a few slices from the nearest position at which decompression can
-/// begin. This function decompresses the stream once up to the end of the frame, which detects damage. The positions
-/// need at most 32 KiB of memory for every 8 MiB of unpacked bytes.
+/// The chunks of a compressed frame. They are decoded in layers of a few slices, each from the last position before it
+/// at which decompression can begin. This function decompresses the stream once up to the end of the frame, to collect
+/// these positions and to detect damage. The positions need at most 32 KiB of memory for every 8 MiB of unpacked bytes.
 /// @throws Error InvalidInput (damaged, truncated), Io, Cancelled.
 std::shared_ptr<const ChunkSource> packed_chunks(const std::string& path, const PixelPlace& place,
                                                  const PackedFrame& frame, const RunContext& run);

@@ -301,7 +301,7 @@ PointTable parse_pcd(const std::string& path, const std::string& bytes) {
 
 PointTable parse_las(const std::string& path, const std::string& content) {
     const Bytes bytes(content, path, std::endian::little);
-    if (bytes.part(0, 4) != "LASF") fail(path, "expected a LAS file, it does not begin with LASF");
+    if (bytes.part(0, 4) != "LASF") fail(path, "expected a LAS file, which begins with LASF");
     const int minor = bytes.at<std::uint8_t>(25);
     const int format = bytes.at<std::uint8_t>(104);
     if ((format & 0xC0) != 0)

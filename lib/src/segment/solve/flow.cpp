@@ -75,7 +75,7 @@ std::string why_vanished(const Problem& problem, const Choices& choices, const S
                    "at the image's end, mark the cut too, or give a `tag_distance` larger than its radius; or "
                    "draw `contours`, or choose another start (`init`)";
     }
-    return "nothing stopped it; lower `delta`, or start closer to the edges (`init`)";
+    return "nothing stopped it; lower `delta`, or start closer to the points or edges (`init`)";
 }
 
 /// Moves a surface through the marks so that the image's intensity profile between the marks matches the one at them.

@@ -244,8 +244,8 @@ TEST_CASE("ICS: invalid, inconsistent and unsupported files are rejected with th
     is_refused(with(&Header::order, "bits y x z"), "expected the axes bits, x, y, z");
     is_refused(with(&Header::order, "x y z bits"), "expected the axes bits, x, y, z");
     is_refused(with(&Header::order, "bits x y z ch"), "got 5 names and 4 sizes");
-    is_refused(with(&Header::parameters, "5"), "got 4 names and 4 sizes for the parameters '5'");
-    is_refused(with(&Header::parameters, "many"), "got 4 names and 4 sizes for the parameters 'many'");
+    is_refused(with(&Header::parameters, "5"), "got 4 names and 4 sizes, and '5' as the number of axes");
+    is_refused(with(&Header::parameters, "many"), "got 4 names and 4 sizes, and 'many' as the number of axes");
     is_refused(with(&Header::order, "bits x y"), "expected a 3D image");
     is_refused(with(&Header::sizes, "16 4 3 0"), "expected a 3D image");
     is_refused(with(&Header::sizes, "16 4 3 -2"), "expected whole numbers as sizes");

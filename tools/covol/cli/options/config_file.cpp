@@ -271,7 +271,7 @@ void require_command(const std::string& section, const std::vector<const CLI::Ap
     for (const CLI::App* command : commands) known.push_back(command->get_name());
     if (std::find(known.begin(), known.end(), section) == known.end())
         throw UsageError(place + in_quotes(section) + " is not a command of covol" + hint(section, known) +
-                         " Options are outside of sections or in the section of a command");
+                         " Write options above the first [section], or in the section of their command");
 }
 
 void require_count(const CLI::Option& option, const CLI::ConfigItem& item, const std::string& place) {

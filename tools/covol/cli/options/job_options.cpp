@@ -13,7 +13,7 @@ namespace covol::tool {
 namespace {
 
 // Type names of option values, by the role of the options: see role_of(). The class Roles of tests/cli/trust_test.py
-// checks the role of every option.
+// checks which options are outputs, which are Conduct, and examples of inputs and settings.
 constexpr std::array<std::string_view, 19> kSettings{"N",
                                                      "INT",
                                                      "UINT",

@@ -26,11 +26,13 @@ public:
     void set_world_of_points();
     /// Copies the unit and the coordinate system from the metadata of a grid.
     void set_world(const FloatGrid& grid);
-    /// Provenance for the metadata of .vdb files: version, options with file names but without folders, digests of the
-    /// inputs, the resolved options once they are known, the unit of length and the coordinate system.
+    /// Provenance for the metadata of .vdb files: version, instruction set, options with file names but without
+    /// folders, names of the options that were given, digests of the inputs, the resolved options and the number of
+    /// bricks once they are known, the unit of length and the coordinate system.
     [[nodiscard]] std::map<std::string, std::string> metadata() const;
     /// The metadata() as comment lines for files of meshes and points.
     [[nodiscard]] std::vector<std::string> comments() const;
+    /// The comments() as one text, with line ends between them.
     [[nodiscard]] std::string comment() const;
     /// Text that identifies the job, so that only the same job continues from a checkpoint: version, instruction set,
     /// command, options that change results, and digests of the inputs.

@@ -81,7 +81,8 @@ PointTable parse_sections(const std::string& path, const std::string& text, cons
             only = label;
             std::vector<Vec3> line;
             for (std::size_t m = 0; m < count; ++m) {
-                if (places.empty()) fail(path, "plane " + name + ": a contour refers to vertices, the plane has none");
+                if (places.empty())
+                    fail(path, "plane " + name + ": a contour refers to vertices, but the plane has none");
                 line.push_back(places[words.count("a vertex's number", 0, places.size() - 1)]);
             }
             if (line.empty()) continue;
