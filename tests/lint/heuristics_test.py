@@ -22,7 +22,7 @@ ALLOWED = {
     "cloud/surface/sharp_mesh.cpp:kNeedle", "cloud/surface/sharp_mesh.cpp:kOnCrease", "cloud/surface/sharp_mesh.cpp:kOnSurface", "cloud/surface/sharp_mesh.cpp:kSame",
     "segment/choices.cpp:kMaxReach",
     "contours/contour_curve.cpp:kLongestPiece", "contours/section_field.cpp:kClosest", "contours/section_field.cpp:kSettled", "contours/slice_field.cpp:kSeedPiece",
-    "edge/edge.cpp:kHaloSigmas", "edge/edge.cpp:kHeatTolerance", "edge/edge.cpp:kLargestHeatStep", "evolve/band_solver.cpp:kDiverged", "evolve/band_solver.cpp:kLocalGoal", "evolve/band_solver.cpp:kMaxOmega", "evolve/band_solver.cpp:kRounding", "evolve/evolve.cpp:kInactiveFraction", "evolve/evolve.cpp:kSmallestStep", "evolve/motion.cpp:kInfinity",
+    "edge/edge.cpp:kHaloSigmas", "edge/edge.cpp:kHeatTolerance", "edge/edge.cpp:kLargestHeatStep", "evolve/band_solver.cpp:kDiverged", "evolve/band_solver.cpp:kLocalGoal", "evolve/band_solver.cpp:kMaxOmega", "evolve/band_solver.cpp:kRounding", "evolve/evolve.cpp:kInactiveFraction", "evolve/evolve.cpp:kLargestTau", "evolve/evolve.cpp:kSmallestStep", "evolve/motion.cpp:kInfinity",
     "guess/guess_correction.cpp:kSolved", "guess/guess_correction.cpp:kSteepestBump", "guess/guess_correction.cpp:kVoxelEnd",
     "guess/marks_surface.cpp:kExact", "guess/marks_surface.cpp:kInfinity", "guess/marks_surface.cpp:kMaxCells", "guess/marks_surface.cpp:kWholeWeight",
     "guess/variational.cpp:kAround", "guess/variational.cpp:kLocalFractions", "guess/variational.cpp:kMinLambda", "guess/variational.cpp:kNoStep", "guess/variational.cpp:kRounding",
