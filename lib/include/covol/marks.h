@@ -59,7 +59,9 @@ struct MarksOrigin {
     MarkFiles files;   ///< empty: the marks were given in memory
     /// how the coordinates of each cloud of points were interpreted, one line each for the user
     std::vector<std::string> rules;
-    std::size_t count = 0;               ///< number of marks that were given
+    /// number of points and marks of contours that were given, without seeds; prepare_marks() sets it to the number of
+    /// marks on painted outlines if only those are given
+    std::size_t count = 0;
     std::optional<std::size_t> thinned;  ///< number of points after thinning
 };
 

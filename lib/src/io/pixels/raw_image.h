@@ -40,7 +40,8 @@ public:
     virtual ~ImageFile() = default;
 
     [[nodiscard]] const ImageInfo& info() const noexcept { return info_; }
-    /// Reads (or maps) the voxels. @throws Error InvalidInput (damaged, truncated), Unsupported (too large), Io.
+    /// Reads (or maps) the voxels of the request's box, in this machine's byte order and as info().type. Calls
+    /// run.check() from time to time. @throws Error InvalidInput (damaged, truncated), Unsupported (too large), Io.
     [[nodiscard]] virtual Pixels read(const PixelRequest& request, const RunContext& run) = 0;
     /// Number of bytes that read() allocates: the size of the whole box, unless a format overrides this.
     [[nodiscard]] virtual std::uint64_t bytes_to_hold(const PixelRequest& request) const;
@@ -100,8 +101,8 @@ Error read_error(Errc code, const std::string& path, const std::string& what, co
 /// The error for a voxel that is NaN or infinite.
 Error not_finite(const std::string& path, const Index3& voxel);
 
-/// Converts the size of an image. @throws Error InvalidInput if it has fewer than two voxels along an axis, or so many
-/// voxels that only a damaged header can claim them.
+/// Converts the size of an image. @throws Error InvalidInput if it has fewer than two voxels along an axis (a 2D image
+/// is not read, not even as one slice), or so many voxels that only a damaged header can claim them.
 Index3 require_3d(const std::string& path, const std::uint64_t (&size)[3]);
 
 /// Allocates memory for the pixels, after checking that a file of `file_bytes` bytes can contain them (0: no check,
