@@ -36,6 +36,24 @@ class Plan(Case):
         self.assertEqual(planned["image"]["size"], [100, 100, 100])
         self.assertEqual(planned["image"]["unpacked_bytes"], 100 ** 3)
 
+    def test_structures_in_a_column(self):
+        self.run_covol("phantom", "two-spheres", "--size", "40", "--count", "200", "-o", self.inputs / "i.nrrd", "--points", self.inputs / "p.xyz")
+        rows = [line.split()[:3] for line in (self.inputs / "p.xyz").read_text().splitlines() if line[0] in "-0123456789"]
+        names = ["left" if float(row[0]) < 0 else "right" for row in rows]
+        table = self.inputs / "both.csv"
+        table.write_text("x,y,z,cell\n" + "".join(",".join([*row, name]) + "\n" for row, name in zip(rows, names)))
+        files = []
+        for name in ("left", "right"):
+            path = self.inputs / f"{name}.xyz"
+            path.write_text("".join(" ".join(row) + "\n" for row, own in zip(rows, names) if own == name))
+            files += ["--points", f"{name}={path}"]
+        voxels = []
+        for marks in (["--points", table, "--structure-column", "cell"], files):
+            self.run_covol("plan", "segment", self.inputs / "i.nrrd", *marks, "-o", "s.vdb", "--json", "plan.json")
+            voxels.append(json.loads((self.out / "plan.json").read_text())["plan"]["active_voxels"])
+        self.assertGreater(voxels[0], 0)
+        self.assertEqual(*voxels)
+
     def test_what_cannot_be_planned(self):
         self.assertIn("segment or reconstruct", self.run_covol("plan", "evolve", code=2).stderr)
         self.run_covol("phantom", "sphere", "--size", "32", "-o", self.inputs / "s.nrrd", "--points", self.inputs / "s.xyz")

@@ -240,6 +240,7 @@ void run_plan(const SegmentJob& job, Session& session) {
     std::set<std::uint64_t> blocks;
     std::vector<Marks> structures = structures_of(job, job.painted.read(session.run()));
     add_starts(job, structures, session.run());
+    read_shared_files(job, structures, image ? std::optional(image->geometry) : std::nullopt, quiet);
     for (const Marks& marks : structures) {
         const StructurePlan one = plan_structure(job, marks, image ? &*image : nullptr, given_h, session, quiet);
         voxels += one.active_voxels;

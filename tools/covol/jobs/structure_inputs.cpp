@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <functional>
 #include <iomanip>
-#include <map>
 #include <sstream>
 
 #include "covol/file_kind.h"
@@ -57,25 +56,6 @@ void add_files(const SegmentJob& job, const std::vector<std::string>& texts, std
         const Named file = split_name(text);
         (find_or_add_structure(structures, file.name).files.*kind).push_back(file.value);
     }
-}
-
-/// Adds the marks and contours from files that name their structures, once the image is known.
-/// @returns the files of each structure, for reports
-std::map<std::string, MarkFiles> read_shared_files(const SegmentJob& job, std::vector<Marks>& structures,
-                                                   const std::optional<ImageGeometry>& geometry,
-                                                   const RunContext& run) {
-    std::map<std::string, MarkFiles> files;
-    assign_files(job, job.points.paths, structures,
-                 [&](Marks& owner, const std::string& file, const KindedPoints& points) {
-                     add_marks(owner, file, points, geometry, speaking_for(owner.name, structures.size(), run));
-                     files[owner.name].points.push_back(file);
-                 });
-    assign_files(job, job.contours.paths, structures,
-                 [&](Marks& owner, const std::string& file, const KindedPoints& points) {
-                     add_contours(owner, points.cloud, geometry, speaking_for(owner.name, structures.size(), run));
-                     files[owner.name].contours.push_back(file);
-                 });
-    return files;
 }
 
 /// Assigns each seed to its structure; seeds without a name are assigned to all.
@@ -179,6 +159,23 @@ void add_starts(const SegmentJob& job, std::vector<Marks>& structures, const Run
     const std::vector<std::string> grids = make_grid_names(names_of(structures));
     for (std::size_t n = 0; n < structures.size(); ++n)
         structures[n].start = LevelSetStart{read_vdb(job.start_path, grids[n])};
+}
+
+std::map<std::string, MarkFiles> read_shared_files(const SegmentJob& job, std::vector<Marks>& structures,
+                                                   const std::optional<ImageGeometry>& geometry,
+                                                   const RunContext& run) {
+    std::map<std::string, MarkFiles> files;
+    assign_files(job, job.points.paths, structures,
+                 [&](Marks& owner, const std::string& file, const KindedPoints& points) {
+                     add_marks(owner, file, points, geometry, speaking_for(owner.name, structures.size(), run));
+                     files[owner.name].points.push_back(file);
+                 });
+    assign_files(job, job.contours.paths, structures,
+                 [&](Marks& owner, const std::string& file, const KindedPoints& points) {
+                     add_contours(owner, points.cloud, geometry, speaking_for(owner.name, structures.size(), run));
+                     files[owner.name].contours.push_back(file);
+                 });
+    return files;
 }
 
 StructuresOptions read_structures(const SegmentJob& job, std::vector<Marks>& structures,

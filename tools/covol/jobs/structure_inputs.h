@@ -1,4 +1,5 @@
 #pragma once
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -25,6 +26,12 @@ namespace covol::tool {
 /// Reads the start of --init from its file. With several structures, each gets its own grid of a .vdb.
 /// @throws UsageError if several structures would start from one shape; Error if the file cannot be read.
 void add_starts(const SegmentJob& job, std::vector<Marks>& structures, const RunContext& run);
+
+/// Adds the marks and contours from files that name their structures, once the geometry of the image is known.
+/// @returns the files of each structure, for reports
+/// @throws Error if a file is invalid or cannot be read
+std::map<std::string, MarkFiles> read_shared_files(const SegmentJob& job, std::vector<Marks>& structures,
+                                                   const std::optional<ImageGeometry>& geometry, const RunContext& run);
 
 /// Reads the structures' files, and chooses their common voxel size.
 /// @throws UsageError if there are neither an image nor marks; Error if a file is invalid or cannot be read.
