@@ -44,8 +44,7 @@ struct EdgeOptions {
 
 template <>
 inline constexpr auto kOptions<EdgeOptions> = std::tuple{
-    Option{"sigma", &EdgeOptions::sigma, kLength, with_image(Group::Edges), "presmoothing of the image",
-           "2vx after tagging and for contours, else 1vx", "1vx"},
+    Option{"sigma", &EdgeOptions::sigma, kLength, with_image(Group::Edges), "presmoothing of the image", "1vx"},
     Option{"edge_feature", &EdgeOptions::feature, with_image(Group::Edges),
            "kind of edges: borders between darker and brighter regions, or bright or dark sheets such as membranes",
            "with contours what their marks lie on, else slope", "slope"},

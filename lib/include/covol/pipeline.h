@@ -152,7 +152,7 @@ inline constexpr auto kOptions<SegmentOptions> = std::tuple{
     Part{&SegmentOptions::edge},
     Option{"coarse_levels", &SegmentOptions::coarse_levels, between(0, 4), Group::Numerics,
            "number of coarser levels, of 2, 4, ... times the voxel size, on which the flow runs first",
-           "1 for a sphere or a box, else 0"},
+           "1 for a sphere or a box in a large domain, else 0"},
     Part{&SegmentOptions::correction},
     Part{&SegmentOptions::holes},
     Part{&SegmentOptions::extract},

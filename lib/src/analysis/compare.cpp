@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "base/matrix.h"
+#include "base/number.h"
 #include "covol/domain.h"
 #include "covol/error.h"
 #include "covol/surface.h"
@@ -247,8 +248,9 @@ ImageGeometry common_lattice(const Shape& a, const Shape& b) {
         lattice.size[c] = int(std::min(size, 1e9));
     }
     if (!(total < kMaxLatticeVoxels) || double(lattice.size[0]) * lattice.size[1] > 1e9)
-        throw Error(Errc::InvalidInput, "compare: the solids together span " + std::to_string(total) +
-                                            " voxels of the finer one; do they lie in the same space?");
+        throw Error(Errc::InvalidInput, "compare: the solids together span " + detail::number(total) +
+                                            " voxels of the finer one, expected less than 1e12 in slices of at most "
+                                            "1e9; do they lie in the same space?");
     lattice.origin = lattice.index_to_world(first);
     return lattice;
 }

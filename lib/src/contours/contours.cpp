@@ -61,12 +61,12 @@ public:
 
     Contours go(const std::vector<PointCloud>& clouds) {
         for (const PointCloud& cloud : clouds) read(cloud);
+        if (clouds.empty()) throw Error(Errc::InvalidInput, "contours: expected at least one file, got none");
         if (lines_.empty())
-            throw Error(
-                Errc::InvalidInput,
-                (clouds.empty() ? std::string("no file") : clouds.front().source) +
-                    ": expected lines of marks (slice, contour, x, y; shapes; selections), got separate points; "
-                    "give them as points instead of contours");
+            throw Error(Errc::InvalidInput,
+                        clouds.front().source +
+                            ": expected lines of marks (slice, contour, x, y; shapes; selections), got separate "
+                            "points; give them as points instead of contours");
         choose_plane();
         if (lies_in_slices() || choose_tilted_plane()) {
             join_lines();
@@ -319,8 +319,8 @@ void Densifier::drop_repeated_loops() {
     const auto repeated = loops_.end() - last;
     loops_.erase(last, loops_.end());
     if (repeated > 0)
-        run_.warn("contours: " + std::to_string(repeated) +
-                  " contours are repeated with the same marks; each is used once");
+        run_.warn("contours: " + std::to_string(repeated) + (repeated > 1 ? " contours repeat" : " contour repeats") +
+                  " the marks of another one; each is used once");
 }
 
 void Densifier::make_solid() {
@@ -409,13 +409,13 @@ void Densifier::link_slices(ContourSolid::Data& data, const std::vector<std::vec
         ++carried;
     }
     if (carried > 0)
-        run_.warn("contours: " + std::to_string(carried) +
-                  " pairs of neighbouring slices have contours that do not overlap; they are joined along the line "
-                  "between their centroids. Mark more slices there if that is wrong");
+        run_.warn("contours: " + std::to_string(carried) + (carried > 1 ? " pairs" : " pair") +
+                  " of neighbouring slices with contours that do not overlap: they are joined along the line between "
+                  "their centroids; mark more slices there if that is wrong");
     if (ended > 0)
-        run_.warn("contours: " + std::to_string(ended) +
-                  " pairs of neighbouring slices have several contours and no overlap; the parts end between them. "
-                  "Mark more slices there if that is wrong");
+        run_.warn("contours: " + std::to_string(ended) + (ended > 1 ? " pairs" : " pair") +
+                  " of neighbouring slices with several contours and no overlap: the parts end between them; mark more "
+                  "slices there if that is wrong");
 }
 
 void Densifier::cap_ends(ContourSolid::Data& data) {

@@ -55,7 +55,7 @@ DistanceResult compute_distance(const std::vector<Vec3>& points, const Domain& d
     require_valid(options, "compute_distance");
     if (domain.voxel_count() == 0) throw Error(Errc::InvalidInput, "the domain is empty");
     const std::vector<Vec3> positions = to_index_space(points, domain);
-    detail::require_tube_memory(points, domain, {options.max_distance, 0, false}, "compute_distance", run);
+    detail::require_tube_memory(points, domain, {options.max_distance, 0, false}, "distance", run);
     const detail::CoordBBox box = detail::box_of(domain);
     const auto h = float(domain.voxel_size), background = float(options.max_distance);
     DistanceResult result;

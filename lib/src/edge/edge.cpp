@@ -9,6 +9,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "base/number.h"
 #include "covol/error.h"
 #include "edge/heuristics.h"
 #include "edge/nth_value.h"
@@ -277,7 +278,7 @@ EdgeResult detect_edges(const Image& image, const FloatGrid& topology, const Edg
 
         result.grid = make_grid(domain, 1.0F, "edge");
         result.grid->topologyUnion(topology);
-        detail::require_memory_of_tiles(*result.grid, "detect_edges", run);
+        detail::require_memory_of_tiles(*result.grid, "edges", run);
         result.grid->tree().voxelizeActiveTiles();
         const detail::SchemeKernels& kernels = detail::kernels();
         const auto per_length = static_cast<float>(1.0 / domain.voxel_size);
@@ -303,9 +304,12 @@ EdgeResult detect_edges(const Image& image, const FloatGrid& topology, const Edg
         else
             report.edge_contrast = automatic_contrast(*result.grid, options, report.feature);
         if (!(report.edge_contrast > 0))
-            throw Error(Errc::InvalidInput, image.path() +
-                                                ": constant throughout the band, so there is no edge; check "
-                                                "that the points lie on the image's structure");
+            throw Error(Errc::InvalidInput,
+                        image.path() + ": limited to intensities from " + detail::number(report.low) + " to " +
+                            detail::number(report.high) +
+                            ", the image is constant throughout the band, so there is no edge; check that the points "
+                            "lie on the image's structure, or segment with the points alone (`rho = 0`)",
+                        "rho");
         report.edge_k = 1.0 / (report.edge_contrast * report.edge_contrast);
         const auto k = static_cast<float>(report.edge_k);
         const std::vector<LeafNode*> leaves = leaves_of(*result.grid);

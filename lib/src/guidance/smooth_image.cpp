@@ -46,8 +46,8 @@ SmoothImage::SmoothImage(const Image& image, const WorldBox& box, double sigma, 
         high_[a] = g.size[a] - 0.5 - first[a];
     }
     detail::require_memory(sizeof(float) * double(size_[0]) * size_[1] * size_[2],
-                           "guide: a smoothed copy of " + image.path() + " around the marks",
-                           "use a coarser image, a smaller `roi`, or `rho` 0", run);
+                           "image guidance: a smoothed copy of " + image.path() + " around the marks",
+                           "use a coarser image, a smaller `roi`, or `rho = 0`", run);
     values_.resize(std::size_t(size_[0]) * size_[1] * size_[2]);
     image.load({first, {first[0] + size_[0] - 1, first[1] + size_[1] - 1, first[2] + size_[2] - 1}}, run);
     tbb::parallel_for(0, size_[2], [&](int k) {

@@ -29,7 +29,8 @@ std::vector<Leaf*> touched(FloatGrid& grid, const detail::NearestField& nearest)
 
 WideDistance::WideDistance(const FloatGrid& start, const std::vector<Vec3>& vertices, const Domain& domain,
                            double width, const RunContext& run)
-    : nearest_(detail::nearest_points(to_index(domain, vertices), detail::box_of(domain), width, "guide", run)),
+    : nearest_(
+          detail::nearest_points(to_index(domain, vertices), detail::box_of(domain), width, "image guidance", run)),
       grid_(start.deepCopy()) {
     const double h = domain.voxel_size;
     // In the outermost voxel of the start's band, the distance is affected by the clamping, and is therefore not used.

@@ -480,8 +480,8 @@ Inferred infer(const FloatGrid& guess, const std::vector<Vec3>& world, const Ima
         const auto at_guess = [&](const Vec3& place) { return detail::level_at(guess, place); };
         if (count_wrong(sides, at) > count_wrong(sides, at_guess)) {
             reject_body(
-                "it puts fewer of the positions known to be inside or outside on the right side than the surface of "
-                "minimum bending energy");
+                "the most probable body given the image puts fewer of the positions known to be inside or outside on "
+                "the right side than the surface of minimum bending energy");
             return;
         }
         result.u = start_from_level(

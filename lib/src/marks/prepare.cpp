@@ -34,8 +34,8 @@ public:
     const PaintedLabel& label_of(const Marks::Paint& paint, const RunContext& run) {
         for (const PaintedLabel& label : of(*paint.image, run).labels)
             if (label.label == paint.label) return label;
-        throw Error(Errc::InvalidInput,
-                    paint.image->image.path() + ": label " + std::to_string(paint.label) + " does not occur");
+        throw Error(Errc::InvalidInput, paint.image->image.path() + ": expected painted voxels of label " +
+                                            std::to_string(paint.label) + ", got none");
     }
 
 private:
@@ -216,7 +216,8 @@ std::vector<StructureInput> prepare_marks(std::vector<Marks> structures, const s
     std::vector<std::string> names;
     for (const Marks& marks : structures) names.push_back(marks.name);
     std::set<std::string> unique(names.begin(), names.end());
-    if (names.empty() || unique.size() < names.size() || (names.size() > 1 && unique.contains("")))
+    if (names.empty()) throw Error(Errc::InvalidInput, "structures: expected at least one, got none");
+    if (unique.size() < names.size() || (names.size() > 1 && unique.contains("")))
         throw Error(Errc::InvalidInput, "expected a unique name for each of several structures");
     number_labels(structures);
     const std::vector<std::string> grids = make_grid_names(names);

@@ -223,7 +223,7 @@ Painted understand_painted(const Image& labels, const std::vector<LabelName>& na
             for (const auto& [label, box] : boxes) list += (list.empty() ? "" : ", ") + std::to_string(label);
             throw Error(Errc::InvalidInput, labels.path() + ": expected the outside label " +
                                                 std::to_string(options.outside_label) + " among its labels, got " +
-                                                list);
+                                                list + "; correct `painted_outside`");
         }
         for (const LabelName& name : names) {
             run.check();

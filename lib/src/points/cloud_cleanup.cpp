@@ -188,7 +188,8 @@ std::vector<Vec3> clean_cloud(const std::vector<Vec3>& points, const CloudCleanu
     }
     own.kept = result.size();
     if (result.empty() && !points.empty())
-        throw Error(Errc::InvalidInput, "none of the " + std::to_string(points.size()) + " points remains");
+        throw Error(Errc::InvalidInput, "none of the " + std::to_string(points.size()) +
+                                            " points remains; leave out `remove_outliers` or `smooth`");
     if (report != nullptr) *report = own;
     run.info(one_line(own, options));
     return result;

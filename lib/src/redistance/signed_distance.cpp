@@ -171,7 +171,7 @@ LeafArray<float> signed_distance(const LeafBand& band, const LeafArray<float>& p
     });
     if (interface.feet.empty()) return result;
     const std::vector<Vec3> points = interface.points();
-    const NearestField tube = nearest_points(points, box, width + 1.0, "signed_distance", run);
+    const NearestField tube = nearest_points(points, box, width + 1.0, "distance", run);
     tbb::parallel_for(std::size_t(0), tube.leaves.size(), [&](std::size_t n) {
         const NearestLeaf& nearest = tube.leaves[n];
         const std::int32_t leaf = band.find(nearest.origin);

@@ -66,8 +66,8 @@ PageSlice make_oblique_slice(const ImageLevels& image, const ObliqueRequest& wan
     for (const Vec3* const v : {&wanted.first, &wanted.right, &wanted.down})
         if (!(length(*v) < 1e9)) throw Error(Errc::InvalidOptions, "oblique slice: expected finite numbers");
     if (wanted.count < 1 || wanted.count > kMaxPixels)
-        throw Error(Errc::InvalidOptions,
-                    "oblique slice: expected 1 to " + std::to_string(kMaxPixels) + " pixels along each side");
+        throw Error(Errc::InvalidOptions, "oblique slice: expected 1 to " + std::to_string(kMaxPixels) +
+                                              " pixels along each side, got " + std::to_string(wanted.count));
     const double pixel = std::clamp(std::min(length(wanted.right), length(wanted.down)), 1.0, double(1 << 20));
     // The size of a pixel, in voxels, is rounded down to a power of two, because the factors of levels usually are
     // powers of two.

@@ -64,7 +64,8 @@ struct Compressor {
         unsigned long size = 0;
         if (tjCompress2(handle, pixels.data(), width, width, height, TJPF_GRAY, &bytes, &size, TJSAMP_GRAY, quality,
                         TJFLAG_ACCURATEDCT) != 0)
-            throw Error(Errc::InvalidInput, std::string("a slice: ") + tjGetErrorStr2(handle));
+            throw Error(Errc::InvalidInput,
+                        std::string("a slice cannot be compressed as JPEG: ") + tjGetErrorStr2(handle));
         return to_base64(bytes, size);
     }
     tjhandle handle;

@@ -52,7 +52,8 @@ void check_extent(const std::vector<Vec3>& points, double h) {
     if (far < kMaxReach * h || maximum >= kMaxReach / 2 * h) return;
     throw Error(Errc::InvalidInput, "points: " + detail::to_text(points[std::size_t(farthest)]) + " lies " +
                                         number(far) + " from the centre of all points, " + number(far / maximum) +
-                                        " times as far as 99 % of them; remove it if it is a mistake");
+                                        " times as far as 99 % of them; remove it if it is a mistake, or use a larger "
+                                        "`voxel_size`");
 }
 
 // Whether the points are treated as a cloud: without an image, if they do not lie in one plane, and are too many for
@@ -61,7 +62,10 @@ bool is_cloud(const Problem& problem, const EvolveOptions& evolve, const std::ve
     const SegmentOptions& o = problem.options;
     if (is_any<CloudStart>(o.start)) {
         if (problem.image == nullptr) return true;
-        throw Error(Errc::InvalidOptions, "segment: the start 'cloud' is for points without an image");
+        throw Error(
+            Errc::InvalidOptions,
+            "segment: `init = cloud` is for points without an image; leave the image out, or choose another start",
+            "init");
     }
     return is_any<AutoStart>(o.start) && problem.is_guided() && !o.contours && !o.tag_distance &&
            !problem.has_seeds() && problem.image == nullptr && uses_points(evolve) && can_enclose(points) &&
@@ -90,7 +94,7 @@ std::vector<Vec3> merged(const std::vector<Vec3>& points, double h, const RunCon
     std::vector<Vec3> kept = merge_close_points(points, kAutomatic.noticeable_voxels * h);
     if (kept.size() < points.size())
         run.info("points: " + std::to_string(kept.size()) + " of " + std::to_string(points.size()) +
-                 " kept, the others are closer to them than half of " + number(kAutomatic.noticeable_voxels * h));
+                 " kept; the others are closer to them than half of " + number(kAutomatic.noticeable_voxels * h));
     return kept;
 }
 
@@ -110,7 +114,8 @@ double choose_attraction_range(const EvolveOptions& evolve, bool tags, double h,
                                const RunContext& run) {
     if (!uses_points(evolve)) return 0;
     if (tags && !uses_image(evolve)) {
-        remarks.choose("attraction_range", "0", "unlimited, because the band around the points limits it", run);
+        remarks.choose("attraction_range", "0",
+                       "unlimited, because the band around the points already limits the attraction", run);
         return 0;
     }
     const double range = kAttractionVoxels * h;
@@ -175,8 +180,8 @@ Resolved resolve(const Problem& problem) {
     const bool has_points = !points.empty(), has_start = is_named(options.start) || options.guess;
     if (!has_points && !has_start && options.inside.empty())
         throw Error(Errc::InvalidInput,
-                    "segment: the start 'tag' expects points, got none; give points, contours or seeds inside, or "
-                    "choose another start (sphere, box, mesh, mask or vdb)");
+                    "segment: expected points, contours, seeds inside or a start that needs none (`init`: sphere, box, "
+                    "mesh, mask or vdb), got none of these");
     c.evolve = with_terms_that_act(problem, has_points, remarks);
     c.edge = options.edge;
     if (options.voxel_size) {

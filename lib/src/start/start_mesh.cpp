@@ -84,8 +84,8 @@ TriangleMesh closed_or_refused(const TriangleMesh& mesh, const RunContext& run) 
     const std::string fraction = detail::number(std::round(1000 * closed.cap_fraction) / 10) + " % of its area";
     if (closed.cap_fraction > kMaxCaps)
         throw Error(Errc::InvalidInput, "the mesh of the start is not closed: expected one with an inside, got " +
-                                            holes + " that need patches of " + fraction +
-                                            "; close it in the program that made it");
+                                            holes + (closed.holes > 1 ? " that need" : " that needs") + " patches of " +
+                                            fraction + "; close it in the program that made it");
     run.warn("the mesh of the start is not closed: " + holes + ", closed by patches of " + fraction +
              " between rim and centre; check the result there");
     return std::move(closed.mesh);

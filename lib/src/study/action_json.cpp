@@ -34,7 +34,7 @@ public:
     [[nodiscard]] StudyId id(const char* name) const {
         const json& value = at(name);
         if (!value.is_number_unsigned() || value.get<std::uint64_t>() > kMaxId)
-            refuse(std::string("'") + name + "': expected a whole number >= 1");
+            refuse(std::string("'") + name + "': expected a whole number from 1 to 2^53");
         return value.get<StudyId>();
     }
     [[nodiscard]] std::string text(const char* name) const {

@@ -53,12 +53,13 @@ struct StudyHistory::Planning {
         const Vec3 index = history.image_.world_to_index(world);
         for (std::size_t a = 0; a < 3; ++a)
             if (!(index[a] >= -0.5 && index[a] <= history.image_.size[a] - 0.5))
-                refuse("a mark lies outside of the image");
+                refuse("a position lies outside of the image");
     }
     static void require_file(const std::string& path, const std::string& digest) {
         if (path.empty() || path.size() > kMaxPathBytes || path.find('\0') != std::string::npos)
             refuse("expected a path of 1 to " + std::to_string(kMaxPathBytes) + " bytes");
-        if (digest.empty() || digest.size() > kMaxNameBytes) refuse("expected a digest of the file");
+        if (digest.empty() || digest.size() > kMaxNameBytes)
+            refuse("expected a digest of the file, of 1 to " + std::to_string(kMaxNameBytes) + " bytes");
     }
     void require_outline(const StudyOutline& outline) const {
         const std::size_t fewest = outline.closed ? 3 : 2;

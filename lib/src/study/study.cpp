@@ -87,7 +87,9 @@ bool is_same(const ImageGeometry& a, const ImageGeometry& b) {
 std::string read_text(const fs::path& path) {
     std::error_code none;
     const std::uintmax_t bytes = fs::file_size(path, none);
-    if (none) fail(Errc::Io, path, "it does not exist; expected the journal of a study");
+    if (none == std::errc::no_such_file_or_directory)
+        fail(Errc::Io, path, "it does not exist; expected the journal of a study");
+    if (none) fail(Errc::Io, path, "it cannot be read (" + none.message() + ")");
     if (bytes > kMaxBytes) fail(Errc::InvalidInput, path, "it is too large for the journal of a study");
     std::ifstream file = open_regular_file(path.string());
     std::string text(std::size_t(bytes), '\0');

@@ -73,10 +73,10 @@ public:
         origin_ = choose_mesh_origin(domain_.world_box(), domain_.voxel_size);
         for (int a = 0; a < 3; ++a) domain_.origin[a] -= origin_[a];
         if (!(grid.background() >= isovalue_))
-            throw Error(Errc::InvalidInput, "grid '" + grid.getName() + "': expected a background above the isovalue " +
-                                                std::to_string(isovalue_) + ", got " +
-                                                std::to_string(grid.background()) +
-                                                "; the surface would not be closed");
+            throw Error(Errc::InvalidInput,
+                        "grid '" + grid.getName() + "': expected a background of at least the isovalue, " +
+                            std::to_string(isovalue_) + ", got " + std::to_string(grid.background()) +
+                            "; the surface would not be closed");
     }
 
     [[nodiscard]] const Vec3& origin() const { return origin_; }

@@ -72,8 +72,9 @@ std::vector<Coord> seed_voxels(const FloatGrid& distance, const Domain& domain, 
         if (distance.tree().isValueOn(voxel) && !(double(d) > options.tag_distance)) {
             std::ostringstream s;
             s << "exterior seed " << to_text(seed)
-              << ": expected a position farther from the points than the tag distance D = " << options.tag_distance
-              << ", got d = " << d << "; move the seed to the middle of the cavity, or use a smaller tag distance";
+              << ": expected a position farther from the points than the tag distance, " << options.tag_distance
+              << ", got one at a distance of " << d
+              << "; move the seed to the middle of the cavity, or use a smaller `tag_distance`";
             throw Error(Errc::InvalidInput, s.str());
         }
         voxels.push_back(voxel);

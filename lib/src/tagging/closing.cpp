@@ -85,7 +85,7 @@ FloatGridPtr close_by_ball(const FloatGrid& band, double tag_distance, const Run
                                            p.origin[2] + double(p.center[2])}));
         }
         if (surface.empty()) return;
-        detail::require_tube_memory(surface, domain, {tag_distance + reach, 0, false}, "close_by_ball", run);
+        detail::require_tube_memory(surface, domain, {tag_distance + reach, 0, false}, "closing", run);
         for (Vec3& p : surface) p = domain.world_to_index(p);
         closed = grown_exterior(band, surface, domain, float(tag_distance), float(reach), run);
         if (closed) detail::track_surface(*closed, domain, detail::kTrackingWidth);

@@ -109,7 +109,9 @@ TagDistanceChoice choose_tag_distance(const std::vector<Vec3>& points, const Dom
     if (choice.tag_distance == 0) {
         const double spacing = measure_spacing(merge_close_points(points, 0.0)).mean;
         choice.tag_distance = std::max(1.8 * spacing, 1.5 * h);
-        reason << "no closed structure found; 1.8 times the mean spacing " << spacing;
+        reason << "no closed structure found; "
+               << (1.8 * spacing < 1.5 * h ? "1.5 voxels, more than 1.8 times" : "1.8 times") << " the mean spacing "
+               << spacing;
     }
     choice.reason = reason.str();
     return choice;

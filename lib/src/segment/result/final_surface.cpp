@@ -154,8 +154,9 @@ struct Maker {
             "holes", to_string(holes.policy),
             (options().holes.policy == Holes::Auto ? "the points cover only one side of an object; " : std::string()) +
                 (holes.loops.empty() ? "none: the whole surface is within " + number(holes.distance) + " of points"
-                                     : std::to_string(holes.loops.size()) + " rims, of length " + lengths +
-                                           (holes.loops.size() > kMaxReportedLoops ? ", ..." : "") +
+                                     : std::to_string(holes.loops.size()) +
+                                           (holes.loops.size() > 1 ? " rims, of lengths " : " rim, of length ") +
+                                           lengths + (holes.loops.size() > kMaxReportedLoops ? ", ..." : "") +
                                            (holes.policy == Holes::Open ? "; the level set stays closed" : "")),
             run());
     }

@@ -113,7 +113,7 @@ private:
         const double largest = std::max(std::abs(low), std::abs(high));
         const double step = largest * std::numeric_limits<float>::epsilon();
         if (high > low && step > kCommon.negligible * (high - low))
-            warn("the image's values lie between " + number(low) + " and " + number(high) +
+            warn("98 % of the image's values lie between " + number(low) + " and " + number(high) +
                  ", where single precision resolves only steps of " + number(step) + ": subtract an offset first");
     }
 

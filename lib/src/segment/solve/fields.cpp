@@ -175,8 +175,8 @@ Edges find_edges(const Problem& problem, const StartFacts& start, const FloatGri
                            number(e.edge_contrast),
                        problem.run);
     if (!options.intensities)
-        remarks.choose("intensities", number(e.low) + " to " + number(e.high), "mapped to 0 and 1, percentiles",
-                       problem.run);
+        remarks.choose("intensities", number(e.low) + " to " + number(e.high),
+                       "percentiles near the band, mapped to 0 and 1", problem.run);
     // These settings are fixed from here on, because g must keep its meaning while the band moves.
     edges.options.feature = e.feature;
     edges.options.edge_k = e.edge_k;
