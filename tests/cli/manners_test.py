@@ -226,7 +226,7 @@ class Words(Case):
         job = ("segment", self.image, "--points", self.points, "-o", "s.vdb")
         for unit in "vx", "voxels":
             self.refuse(*job, "--delta", "0.5", unit, code=2, expected_text="--delta: expected a length in voxels without a blank, 0.5vx")
-        self.refuse(*job, "--voxel-size", "2", "um", code=2, expected_text="lengths are in the image's own unit")
+        self.refuse(*job, "--voxel-size", "2", "um", code=2, expected_text="lengths are in the unit of the input")
         self.run_covol(*job, "--delta", "0.5vx", "--quiet")
 
 

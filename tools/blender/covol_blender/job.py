@@ -38,7 +38,7 @@ class Job:
         try:
             more = shlex.split(options)
         except ValueError as error:
-            raise _process.Failed(2, f"further options: {options}: {error}") from None
+            raise _process.Failed(2, f"options: {options}: {error}") from None
         if is_lapse and not image:
             raise _process.Failed(3, "a time-lapse needs an image: choose one")
         found = _process.find_program(program)

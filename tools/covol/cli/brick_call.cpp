@@ -78,7 +78,7 @@ BrickCall run_call(Words& words, const CLI::App& program) {
     call.step = BrickCall::Step::Run;
     if (const std::string sweep = take_option(words, {"--sweep"}); !sweep.empty())
         if (!parse_whole(sweep, call.sweep) || call.sweep < 1)
-            throw UsageError("brick run: --sweep: expected a number from 1, got " + sweep);
+            throw UsageError("brick run: --sweep: expected a whole number from 1, got " + sweep);
     if (words.empty() || is_option(words[0])) throw UsageError("brick run: expected the folder of a plan");
     call.folder = words[0];
     std::size_t end = 1;
@@ -128,7 +128,10 @@ Json read_plan_file(const std::string& folder) {
         if (!plan.is_object()) throw Error(Errc::InvalidInput, plan_file(folder) + ": expected a JSON object");
         return plan;
     } catch (const Error& error) {
-        throw Error(error.code(), plan_file(folder) + ": expected a plan written by covol brick plan: " + error.what());
+        const std::string file = plan_file(folder) + ": ";
+        std::string why = error.what();
+        if (why.starts_with(file)) why.erase(0, file.size());
+        throw Error(error.code(), file + "expected a plan written by covol brick plan: " + why);
     }
 }
 

@@ -254,11 +254,17 @@ void Session::write_report() {
 }
 
 std::string Session::memory_text() const {
-    return "more memory is needed than " + memory_bound_.name + "; use a larger --voxel-size or a --roi";
+    std::string remedies;
+    for (const auto& [flag, remedy] :
+         {std::pair{"--voxel-size", "a larger --voxel-size"}, std::pair{"--roi", "a --roi"}})
+        if (command_->get_option_no_throw(flag) != nullptr)
+            remedies += (remedies.empty() ? "; use " : " or ") + std::string(remedy);
+    return "more memory is needed than " + memory_bound_.name + remedies;
 }
 
 std::string Session::interrupted_text() const {
-    return outputs_.kept().empty() ? "interrupted, nothing was written"
+    if (brick_ && brick_->step == BrickCall::Step::Run) return "interrupted; bricks that were finished before are kept";
+    return outputs_.kept().empty() ? "interrupted; no output was written"
                                    : "interrupted; outputs that were finished before are kept";
 }
 

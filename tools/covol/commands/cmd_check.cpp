@@ -57,12 +57,12 @@ void check_extent(double extent, const std::string& what, Findings& findings) {
     findings.facts.extent = std::max(findings.facts.extent, extent);
     if (!findings.in_general()) return;
     if (extent > kFarClip)
-        findings.remark(what + " is " + std::to_string(extent) +
+        findings.remark(what + " is " + to_text(extent) +
                         " units wide: Blender and Houdini interpret a unit as a metre and clip it; write meshes with "
                         "--unit-scale, or scale the object");
     if (extent > 0 && extent < kNearClip)
         findings.remark(
-            what + " is " + std::to_string(extent) +
+            what + " is " + to_text(extent) +
             " units wide: Blender and Houdini interpret a unit as a metre and show a dot; write meshes with "
             "--unit-scale, or scale the object");
 }
@@ -160,11 +160,11 @@ void check_image(const std::string& path, const ImageFlags& flags, const RunCont
         findings.remark(std::to_string(chunks->read) + " of " + std::to_string(chunks->total) +
                         " chunks were read: problems of the others are found only when these are read");
     if (range[0] == range[1] && !is_sample)
-        findings.problem("all voxels are " + std::to_string(range[0]) + ": there is no edge");
+        findings.problem("all voxels are " + to_text(range[0]) + ": there is no edge");
     if (g.unit.empty()) findings.remark("the file states no unit of length: lengths are in its own units");
     const auto [minimum, maximum] = std::minmax_element(g.spacing.begin(), g.spacing.end());
     if (*maximum > kFlatVoxels * *minimum)
-        findings.remark("voxels are " + std::to_string(*maximum / *minimum) +
+        findings.remark("voxels are " + to_text(*maximum / *minimum) +
                         " times longer along one axis: between the slices the surface is interpolated");
     if (!g.spacing_known)
         findings.remark("the file states no complete spacing: 1 is used for missing values; see --spacing");
@@ -216,8 +216,9 @@ void check_points(const std::string& path, const std::string& image_path, const 
         }
         const SpacingStatistics s = measure_spacing(distinct);
         if (isolated.empty() && s.max > kFarPoint * s.median)
-            findings.remark("a point lies " + std::to_string(s.max) + " from its nearest neighbour, the median is " +
-                            std::to_string(s.median) + ": it may be an outlier");
+            findings.remark("a point lies " + to_text(s.max) +
+                            " from its nearest neighbour, and the median of this distance is " + to_text(s.median) +
+                            ": it may be an outlier");
     }
     if (image_path.empty()) return;
     const ImageGeometry geometry = read_image_geometry(image_path, flags.options, run);

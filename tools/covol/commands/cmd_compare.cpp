@@ -34,7 +34,9 @@ struct CompareJob {
     void run(Session& session) const {
         const bool points_a = kind_of_file(a) == FileKind::Points;
         const bool points_b = kind_of_file(b) == FileKind::Points;
-        if (points_a && points_b) throw Error(Errc::Unsupported, "compare: " + a + " and " + b + " are both points");
+        if (points_a && points_b)
+            throw Error(Errc::Unsupported,
+                        "compare: expected points and a .vdb or a mesh, got points twice: " + a + " and " + b);
         if (points_a) return measure_points(a, b, session);
         if (points_b) return measure_points(b, a, session);
         compare_solids(session);

@@ -173,10 +173,11 @@ struct ConvertJob {
         if (from == FileKind::Vdb && to == FileKind::Vdb) return vdb_to_vdb(session);
         if (from == FileKind::Points && to == FileKind::Points) return convert_points(session);
         if (from == FileKind::Mesh && to == FileKind::Mesh) return convert_mesh(session);
-        throw Error(Errc::Unsupported, std::string("convert: ") + input + " holds " + to_string(from) + ", " + output +
-                                           " would hold " + to_string(to) +
-                                           ": expected image and image or .vdb, .vdb and .vdb or .nvdb, points and "
-                                           "points, or mesh and mesh; see also covol mesh, mask and segment --init");
+        throw Error(Errc::Unsupported,
+                    std::string("convert: ") + input + " holds " + to_string(from) + ", " + output + " would hold " +
+                        to_string(to) +
+                        ": expected image and image or .vdb; .vdb and .vdb, .nvdb or image; points and "
+                        "points; or mesh and mesh; see also covol mesh, mask and segment --init");
     }
 };
 

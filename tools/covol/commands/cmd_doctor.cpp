@@ -128,8 +128,8 @@ private:
         const fs::path folder = fs::temp_directory_path(failed);
         const fs::space_info space = failed ? fs::space_info{0, 0, 0} : fs::space(folder, failed);
         if (failed) {
-            session.warn("temporary files: " + folder.string() + ": " + failed.message() +
-                         "; set TMPDIR to a writable folder");
+            session.warn("temporary files: " + (folder.empty() ? "no folder" : folder.string()) + ": " +
+                         failed.message() + "; set TMPDIR to a writable folder");
             return {{"folder", folder.string()}, {"free_bytes", 0}};
         }
         session.print("temporary files: " + folder.string() + ", " + bytes_text(double(space.available)) + " free");

@@ -71,8 +71,9 @@ struct MeshJob {
         TriangleMesh mesh = extract_mesh(*level_set, extract.resolve(h), session.run());
         session.add_seconds("surface", watch.seconds());
         if (mesh.triangles.empty())
-            throw Error(Errc::InvalidInput,
-                        input + ": nothing to mesh: no surface at this level, or all of it dropped");
+            throw Error(
+                Errc::InvalidInput,
+                input + ": nothing to mesh: no surface at --isovalue, or all of it smaller than --min-component");
         const Stopwatch relaxing;
         const RelaxReport relaxed = relax_mesh(mesh, *level_set, {extract.resolve(h).isovalue}, session.run());
         session.add_seconds("relax", relaxing.seconds());

@@ -334,9 +334,9 @@ private:
             if (found.same_layout && found.voxels == 0) continue;
             same = false;
             session.print(safe_text(info.name) + ": " +
-                          (found.same_layout ? std::to_string(found.voxels) + " voxels differ, by up to " +
-                                                   std::to_string(found.largest)
-                                             : "the sets of active voxels differ"));
+                          (found.same_layout
+                               ? std::to_string(found.voxels) + " voxels differ, by up to " + to_text(found.largest)
+                               : "the sets of active voxels differ"));
         }
         facts["same"] = same;
         if (same) return session.print("bit-identical: " + std::to_string(voxels) + " active voxels");

@@ -30,7 +30,8 @@ void CheckpointFlags::begin(Session& session) const {
     const bool resumes = !resumed.empty();
     const std::string& path = resumes ? resumed : folder;
     const auto checkpoints = std::make_shared<Checkpoints>(path, every, session.provenance().job_text(), resumes);
-    if (resumes && !checkpoints->had_states()) session.note("--resume: " + path + " has no state yet: from the start");
+    if (resumes && !checkpoints->had_states())
+        session.note("--resume: " + path + " has no state yet; the run starts from the beginning");
     session.keep_states(checkpoints);
 }
 

@@ -162,7 +162,11 @@ void make_folder_of(const std::string& file) {
     const fs::path folder = fs::path(file).parent_path();
     std::error_code status;
     fs::create_directories(folder, status);
-    if (!fs::is_directory(fs::symlink_status(folder, status)))
+    const std::error_code failed = status;
+    const fs::file_status made = fs::symlink_status(folder, status);
+    if (failed && !fs::exists(made))
+        throw Error(Errc::Io, folder.string() + ": cannot make the folder: " + failed.message());
+    if (!fs::is_directory(made))
         throw Error(Errc::Io, folder.string() + ": cannot write: expected a folder, got a link or a file");
 }
 
@@ -214,8 +218,17 @@ BrickPlan BrickFolder::read_plan() const {
     const Json json = read_plan_file(path_);
     constexpr int kMaxInt = std::numeric_limits<int>::max();
     BrickPlan plan;
+    const auto refuse = [&](const std::exception& error) {
+        throw Error(Errc::InvalidInput, file + ": expected a plan written by covol brick plan: " + error.what());
+    };
     try {
         check_inputs(json, file);
+    } catch (const Error&) {
+        throw;  // about an input, not about the plan
+    } catch (const std::exception& error) {
+        refuse(error);
+    }
+    try {
         plan.options.overlap = whole(json, "overlap", 0, kMaxInt);
         plan.options.tolerance = real(json, "tolerance");
         plan.options.max_sweeps = whole(json, "most_sweeps", 0, kMaxInt);
@@ -228,11 +241,8 @@ BrickPlan BrickFolder::read_plan() const {
             throw std::out_of_range("bricks: expected a list of at least one brick");
         for (const Json& brick : bricks) plan.bricks.push_back(brick_of(brick, plan.domain, bricks.size()));
         if (const std::string why = why_invalid(plan.edge); !why.empty()) throw std::out_of_range(why);
-    } catch (const Error& error) {
-        if (error.code() == Errc::Io) throw;
-        throw Error(Errc::InvalidInput, file + ": expected a plan written by covol brick plan: " + error.what());
     } catch (const std::exception& error) {
-        throw Error(Errc::InvalidInput, file + ": expected a plan written by covol brick plan: " + error.what());
+        refuse(error);
     }
     if (const std::string why = why_invalid(plan.options); !why.empty())
         throw Error(Errc::InvalidInput, file + ": " + why);

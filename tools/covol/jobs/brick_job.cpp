@@ -124,7 +124,11 @@ void report_seams(const BrickPlan& plan, const BrickFolder& folder, int sweep, S
     std::ostringstream text;
     text << std::setprecision(2) << "neighbouring bricks lie up to " << gap << " voxels apart after sweep " << sweep;
     if (gap > kWarnOfGap)
-        session.warn(text.str() + ": run the next one, and join again");
+        session.warn(text.str() + (session.brick()
+                                       ? ": run the next sweep, covol brick run " + folder.path() + " --sweep " +
+                                             std::to_string(sweep + 1) + ", and join again"
+                                       : "; their mean is taken: check the surface there, or use larger bricks "
+                                         "(--memory-limit, --brick-voxels)"));
     else
         session.note(text.str() + "; their mean is taken");
 }
@@ -151,8 +155,9 @@ bool streams_mesh(const SegmentJob& job, const BrickPlan& plan, const Session& s
     if (memory_of_joined(voxels) > limit)
         refuse(memory_of_joined(voxels), "the joined level set (covol brick can join it on another machine)");
     if (job.evidence.wanted() || needs_mesh(job.given.options.holes.policy) || job.given.has("min_component"))
-        refuse(memory_of_joined_mesh(voxels),
-               "the whole mesh, which --evidence, --suggest, --holes and --min-component need,");
+        refuse(
+            memory_of_joined_mesh(voxels),
+            "the whole mesh, which --evidence, --suggest, --suggestions, --report, --holes and --min-component need,");
     if (!job.mesh_path.empty() && !can_stream_mesh(job.mesh_path))
         refuse(memory_of_joined_mesh(voxels), "the whole mesh (.ply, .stl and .obj can be streamed)");
     return true;
@@ -173,7 +178,8 @@ SegmentResult join(const SegmentJob& given, BrickJob& job, const BrickPlan& plan
     if (spent.unsteady > 0) {
         result.report.solve.stop_reason = StopReason::MaxSteps;
         session.warn(std::to_string(spent.unsteady) + " of " + std::to_string(plan.bricks.size()) +
-                     " bricks are not steady after " + std::to_string(spent.steps) + " steps");
+                     " bricks are not steady after " + std::to_string(spent.steps) + " steps; increase --max-steps" +
+                     (session.brick() ? ", and plan again" : ""));
     }
     return result;
 }
@@ -272,9 +278,10 @@ SegmentResult solve_within_limit(const SegmentJob& job, const std::optional<Imag
         return in_one();
     }
     if (run.checkpoints)
-        throw Error(Errc::InvalidOptions,
-                    "--checkpoint: the band is larger than --memory-limit allows at once, and bricks store their own "
-                    "states: see covol brick");
+        throw Error(
+            Errc::InvalidOptions,
+            "--checkpoint, --resume: the band is larger than --memory-limit allows at once, and bricks store their own "
+            "states: see covol brick");
     (void)streams_mesh(job, plan, session);  // throws now if the bricks could not be joined later
     run.info(about_voxels(plan.active_voxels()) + " in the band, more than --memory-limit allows at once: in " +
              std::to_string(plan.bricks.size()) + " bricks");

@@ -198,7 +198,7 @@ const std::vector<Rule>& rules() {
          [](Facts) -> Text { return "it is open: a slicer does not know what is inside"; },
          [](Facts) -> Text { return "--repair, or --holes close if a cloud has holes"; }},
         {Program::Print, kProblem, [](Facts f) { return is_mesh(f) && f.crossings > 0; },
-         [](Facts f) -> Text { return number(f.crossings) + " triangles intersect each other"; },
+         [](Facts f) -> Text { return "triangles intersect each other " + std::to_string(f.crossings) + " times"; },
          [](Facts) -> Text { return "covol mesh --repair"; }},
         {Program::Print, kProblem, [](Facts f) { return is_mesh(f) && is_other_unit(f); }, other_unit,
          [](Facts f) -> Text { return "--unit-scale " + number(millimetres(f)) + ", times the desired enlargement"; }},

@@ -60,7 +60,8 @@ void SegmentJob::check_settings() const {
     cloud.check();
     mesh.check_plain(mesh_path);
     if (mesh.plain && evidence.wanted())
-        throw UsageError("--plain: excludes --evidence, --suggest and --report, which need the whole mesh");
+        throw UsageError(
+            "--plain: excludes --evidence, --suggest, --suggestions and --report, which need the whole mesh");
 }
 
 std::string SegmentJob::unused(const SegmentReport& report) const {
@@ -106,7 +107,7 @@ void SegmentJob::take_study_options() {
 
 void SegmentJob::find_image() {
     if (!images.empty()) return;
-    if (study.empty()) throw UsageError("expected an image");
+    if (study.empty()) throw UsageError("expected an image, or --study STUDY, got neither");
     images.push_back((std::filesystem::path(study) / read_study_image(study).path).lexically_normal().string());
 }
 
@@ -278,7 +279,7 @@ void SegmentJob::run(Session& session) const {
     for (const std::vector<std::string>* texts : {&points.paths, &contours.paths, &seeds.inside, &seeds.outside})
         names = names || std::any_of(texts->begin(), texts->end(), has_name);
     if (names && images.empty())
-        throw UsageError("expected files without names: several structures need an image, see covol segment");
+        throw UsageError("expected files without names: several structures need an image; see covol segment");
     if (images.empty()) session.provenance().set_world_of_points();
     session.outputs().protect(images);  // the image may come from a study, not from the command line
     if (session.is_planning()) return run_plan(*this, session);

@@ -39,7 +39,8 @@ void assign_files(const SegmentJob& job, const std::vector<std::string>& texts, 
         const std::string column = column_of(job, text);
         if (column.empty()) continue;
         if (text == "-" || !split_name(text).name.empty())
-            throw UsageError("--structure-column: expected a file whose marks name their structures, got " + text);
+            throw UsageError(
+                "--structure-column: expected a file, without NAME=, whose marks name their structures, got " + text);
         for (const auto& [name, points] : job.shared->read(text, column, job.points.options))
             take(find_or_add_structure(structures, name), text, points);
     }
@@ -118,11 +119,12 @@ std::vector<Marks> structures_of(const SegmentJob& job,
         if (structures.size() > 1 && marks.name.empty()) {
             const MarkFiles& files = marks.files;
             throw UsageError(
-                "--points, --contours: expected a name for every file when one has a name (ve=FILE) or several labels "
-                "are painted, got none for " +
+                "--points, --contours, --guess, --painted: expected a name for every file when one has a name "
+                "(ve=FILE) or several labels are painted, got none for " +
                 (!files.points.empty()     ? files.points.front()
                  : !files.contours.empty() ? files.contours.front()
-                                           : files.guess));
+                 : marks.paint.empty()     ? files.guess
+                                           : marks.paint.front().image->image.path()));
         }
     assign_seeds(structures, "--inside", job.seeds.inside, &MarkFiles::inside, &Marks::inside);
     assign_seeds(structures, "--outside", job.seeds.outside, &MarkFiles::outside, &Marks::outside);
@@ -155,7 +157,8 @@ void add_starts(const SegmentJob& job, std::vector<Marks>& structures, const Run
     }
     if (!is_any<LevelSetStart>(start))
         throw UsageError(
-            "--init: several structures cannot start from one shape; expected tag, or vdb:FILE with a grid for each");
+            "--init: several structures cannot start from one shape; expected auto, guess, tag, or vdb:FILE with a "
+            "grid for each");
     const std::vector<std::string> grids = make_grid_names(names_of(structures));
     for (std::size_t n = 0; n < structures.size(); ++n)
         structures[n].start = LevelSetStart{read_vdb(job.start_path, grids[n])};
@@ -200,7 +203,7 @@ StructuresOptions read_structures(const SegmentJob& job, std::vector<Marks>& str
         if (!image) thin_points(marks, job.cloud.inputs.options.max_points, own);
         session.add_seconds("read", watch.seconds());
         if (!image && marks.points.empty() && marks.contours.empty())
-            throw UsageError("expected an image, points or contours, got none");
+            throw UsageError("expected points or contours, got none");
         if (!h) h = job.resolve_voxel_size(image ? &*image : nullptr, marks, geometry, session);
     }
     return {job.resolve(*h), job.marks_options(*h)};

@@ -32,8 +32,8 @@ std::vector<Frame> frames_of(const SegmentJob& job) {
     const int count = read_image_info(job.images.front(), job.image.options).frames;
     const int first = job.frames.all ? 0 : job.frames.first, last = job.frames.all ? count - 1 : job.frames.last;
     if (last >= count)
-        throw Error(Errc::InvalidOptions, "--frame: frame " + std::to_string(last) + " does not exist: " +
-                                              job.images.front() + " has " + std::to_string(count));
+        throw Error(Errc::InvalidOptions, "--frame: expected frames 0 to " + std::to_string(count - 1) + " of " +
+                                              job.images.front() + ", got " + std::to_string(last));
     for (int n = first; n <= last; ++n) {
         frames.push_back({job.images.front(), job.image.options, n});
         frames.back().options.frame = n;

@@ -95,7 +95,8 @@ GivenFile keep_file(const std::string& name, const std::string& bytes, bool is_m
     if (failed) throw Error(Errc::Io, "import: " + into.string() + ": cannot be created (" + failed.message() + ")");
     if (bytes_in(into) + bytes.size() > kMaxFolderBytes)
         throw Error(Errc::InvalidInput,
-                    "import: " + into.string() + ": contains 4 GiB already; remove files that no structure uses");
+                    "import: " + into.string() +
+                        ": expected at most 4 GiB with this file; remove files that no structure uses");
     const std::string digest = digest_of_bytes(bytes);
     const std::filesystem::path path = into / (digest.substr(digest.find(':') + 1) + ending);
     // The file has been imported before, perhaps for another structure; it is not replaced.

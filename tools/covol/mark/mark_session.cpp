@@ -347,7 +347,9 @@ serve::Response MarkSession::mesh(const serve::Request& request) const {
         const auto found = solved_.find(id);
         if (found != solved_.end() && std::int64_t(found->second.version) == version) surface = mesh_of(found->second);
     }
-    if (!surface) return refused(404, "it was replaced by a newer surface");
+    if (!surface)
+        return refused(
+            404, "this surface does not exist any more: it was replaced by a newer one, or its structure was deleted");
     serve::Response response;
     response.type = "application/octet-stream";
     response.body = make_page_mesh(*surface);

@@ -51,8 +51,10 @@ const PageImage::Channel& PageImage::channel_of(const serve::Request& request) c
     if (!request.query.contains("channel")) return own_;
     const std::int64_t number = number_of(request, "channel");
     if (number < 0 || number >= std::int64_t(channels_.names.size()))
-        throw Error(Errc::InvalidInput,
-                    "'channel': expected one of the image's " + std::to_string(channels_.names.size()) + ", from 0");
+        throw Error(Errc::InvalidInput, channels_.names.empty()
+                                            ? "'channel': expected none, because the image has only one"
+                                            : "'channel': expected 0 to " + std::to_string(channels_.names.size() - 1) +
+                                                  ", got " + std::to_string(number));
     if (number == channels_.own) return own_;
     const std::lock_guard lock(mutex_);  // so that two requests do not open the same channel
     const auto found = others_.find(int(number));

@@ -23,7 +23,7 @@ def transform_of(layer):
     if affine is not None:
         full = np.asarray(getattr(affine, "affine_matrix", affine), float)
         if full.shape[0] < 4:
-            raise covol.Error("covol: expected a layer of three axes", "invalid_input", "affine")
+            raise covol.Error(f"covol: expected a layer of three axes, got {full.shape[0] - 1}", "invalid_input", "affine")
         last = np.eye(4)
         last[:3, :3], last[:3, 3] = full[-4:-1, -4:-1], full[-4:-1, -1]
         matrix = last @ matrix

@@ -32,8 +32,8 @@ def image(value, spacing=None, origin=None, direction=None, affine=None, name="i
     given = {"spacing": spacing, "origin": origin, "direction": direction}
     if is_path(value):
         if origin is not None or direction is not None:
-            raise Error("origin, direction: expected for an array, got a file, which has its own", "invalid_options",
-                        "origin")
+            name = "origin, direction" if affine is None else "affine"
+            raise Error(f"{name}: expected for an array, got a file, which has its own", "invalid_options", name.split(",")[0])
         return read_image(value, spacing=spacing)
     if isinstance(value, _covol.Image):
         if all(v is None for v in given.values()):

@@ -32,7 +32,7 @@ def find_program(given=""):
         if given:
             break
     raise Failed(4, (f"{given}: expected the program covol" if given else "the program covol was not found") +
-                 "; install it (docs/install.md) and name its path in the settings")
+                 "; install it (docs/install.md), and set the variable COVOL, or the plugin's setting, to its path")
 
 
 class Process:
@@ -96,4 +96,4 @@ class Process:
         if code in (130, -signal.SIGINT):  # -SIGINT: the program had not installed its signal handler yet
             raise Interrupted(code, "cancelled")
         if code != 0:
-            raise Failed(code, self._failure or f"the program covol ended with {code}")
+            raise Failed(code, self._failure or (f"the program covol ended with exit code {code}" if code > 0 else f"signal {-code} ended the program covol"))

@@ -227,7 +227,7 @@ class Points:
             self.normals = unit[:, ::-1] if order == "zyx" else unit
             if len(self.normals) != len(self._parts[0]) or self.space != "world":
                 raise Error(f"normals: expected one for each point, both in world units, got {len(self.normals)} for "
-                            f"{len(self._parts[0])}", "invalid_input", "normals")
+                            f"{len(self._parts[0])} points in space '{self.space}'", "invalid_input", "normals")
 
     @classmethod
     def _of_file(cls, path, space, order, scale, channels):

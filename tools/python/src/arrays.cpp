@@ -135,7 +135,7 @@ Image to_image(const py::handle& given, ImageGeometry geometry) {
     if (!is_whole(array)) array = py::array(array.attr("copy")());
     for (int a = 0; a < 3; ++a) {
         if (array.shape(2 - a) > std::numeric_limits<std::int32_t>::max())
-            bad("image", "fewer voxels along each axis", shape_text(array));
+            bad("image", "at most 2147483647 voxels along each axis", shape_text(array));
         geometry.size[a] = static_cast<std::int32_t>(array.shape(2 - a));
     }
     VoxelView view;
@@ -206,7 +206,8 @@ TriangleMesh to_mesh(const py::handle& vertices, const py::handle& faces) {
         std::array<std::uint32_t, 3> triangle{};
         for (std::size_t c = 0; c < 3; ++c) {
             if (!(f[c] >= 0 && f[c] < count) || f[c] != std::floor(f[c]))
-                bad("faces", "indices of vertices, 0 to " + std::to_string(mesh.vertices.size()), std::to_string(f[c]));
+                bad("faces", "indices of vertices, 0 to " + std::to_string(std::int64_t(mesh.vertices.size()) - 1),
+                    std::to_string(f[c]));
             triangle[c] = static_cast<std::uint32_t>(f[c]);
         }
         mesh.triangles.push_back(triangle);

@@ -18,6 +18,8 @@
 namespace covol::python {
 namespace {
 
+const char* space_name(PointSpace space) { return space == PointSpace::Slices ? "slices" : to_string(space); }
+
 ImageGeometry make_geometry(const py::handle& spacing, const py::handle& origin, const py::handle& direction,
                             const std::string& unit) {
     ImageGeometry geometry;
@@ -70,7 +72,8 @@ PointCloud make_points(const std::string& name, const py::object& positions, con
         if (cloud.normals.size() != cloud.points.size() || cloud.space != PointSpace::World)
             throw Error(Errc::InvalidInput,
                         "normals: expected one for each point, both in world units, got " +
-                            std::to_string(cloud.normals.size()) + " for " + std::to_string(cloud.points.size()),
+                            std::to_string(cloud.normals.size()) + " for " + std::to_string(cloud.points.size()) +
+                            " points in space '" + space_name(cloud.space) + "'",
                         "normals");
         return cloud;
     }
@@ -240,10 +243,7 @@ void add_points(py::module_& module) {
             },
             "Points of each contour: a list of arrays (n, 3).")
         .def_property_readonly(
-            "space",
-            [](const PointCloud& cloud) {
-                return cloud.space == PointSpace::Slices ? "slices" : to_string(cloud.space);
-            },
+            "space", [](const PointCloud& cloud) { return space_name(cloud.space); },
             "'world', 'index', 'local' or 'slices'.")
         .def_readonly("rule", &PointCloud::rule, "How the coordinates were interpreted.")
         .def_readonly("source", &PointCloud::source, "The file.")

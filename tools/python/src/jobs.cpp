@@ -66,15 +66,15 @@ py::object report_of(const Result& r) {
     return from_json(json.dump());
 }
 
-const Image& image_of(const Result& r) {
-    if (!r.image) throw Error(Errc::InvalidInput, "mask: expected an image, got points alone");
+const Image& image_of(const Result& r, const std::string& what) {
+    if (!r.image) throw Error(Errc::InvalidInput, what + ": expected an image, got points alone");
     return *r.image;
 }
 
 /// The mask of a result: the guess with its own values if it is a mask that was corrected; otherwise 1 at voxels whose
 /// centre is inside.
 py::array mask_of(const Result& r, const Call& call) {
-    const Image& image = image_of(r);
+    const Image& image = image_of(r, "mask");
     const Image* const guess = r.guess && r.guess->mask ? &*r.guess->mask : nullptr;
     std::vector<std::uint8_t> voxels;
     std::vector<std::int32_t> labels;
@@ -89,7 +89,7 @@ py::array mask_of(const Result& r, const Call& call) {
 
 /// The numbers of the structures, from 1, at voxels whose centre is inside; 0 outside of all.
 py::array label_image(const std::vector<std::shared_ptr<Result>>& results, const Call& call) {
-    const ImageGeometry geometry = image_of(*results.at(0)).geometry();
+    const ImageGeometry geometry = image_of(*results.at(0), "mask").geometry();
     std::vector<Structure> solids;
     for (const auto& r : results) solids.push_back({r->name.empty() ? r->grid : r->name, r->result.surface});
     std::vector<std::uint8_t> voxels;
@@ -107,7 +107,7 @@ Mesh mesh_of(const std::shared_ptr<Result>& r) {
 /// (slice, index (z, y, x), world position (x, y, z), area) for each slice on which marks would improve the result.
 py::list suggest(const Result& r, int count, const Call& call) {
     kNotNegative.require("count", count);
-    const Image& image = image_of(r);
+    const Image& image = image_of(r, "suggest");
     Evidence evidence;
     call.run([&](const RunContext& run) { evidence = assess_evidence(r.result, r.marks, image, count, run); });
     py::list all;

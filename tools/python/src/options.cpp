@@ -48,7 +48,8 @@ T from_python(const OptionInfo& option, py::handle value) {
     } else if constexpr (kIsNumber<T>) {
         const double number = to_number(name, value);
         const bool whole = number == std::floor(number) && std::abs(number) < 1e9;
-        if (std::is_integral_v<T> && !whole) reject(name, "a whole number", value);
+        if (std::is_integral_v<T> && !whole)
+            reject(name, number == std::floor(number) ? "a whole number of at most 9 digits" : "a whole number", value);
         option.range.require(name, number);
         return static_cast<T>(number);
     } else if constexpr (std::is_same_v<T, Vec3>) {

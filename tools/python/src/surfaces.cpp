@@ -83,7 +83,8 @@ Mesh make_mesh(const LevelSet& surface, const py::object& isovalue, const py::ob
     call.run([&](const RunContext& run) {
         *mesh = extract_mesh(*surface.grid, extract, run);
         if (mesh->empty())
-            throw Error(Errc::InvalidInput, "mesh: nothing to mesh: no surface at this level, or all of it dropped");
+            throw Error(Errc::InvalidInput,
+                        "mesh: nothing to mesh: no surface at isovalue, or all of it smaller than min_component");
         relax_mesh(*mesh, *surface.grid, {extract.isovalue}, run);
         if (repair || smooth > 0 || cleanup.target_edge > 0 || cleanup.adaptive > 0)
             clean_mesh(*mesh, *surface.grid, extract.isovalue, cleanup, run);

@@ -15,13 +15,14 @@ namespace {
     throw UsageError(flag + ": expected " + expected + ", got '" + text + "'", flag);
 }
 
-/// The number at the beginning of `text`; `rest` gets the text after it.
-double leading_number(const std::string& flag, const std::string& expected, const std::string& text,
-                      std::string& rest) {
+/// The number at the beginning of `text`; `rest` gets the text after it. `whole`, of which `text` is a part, is shown
+/// in the message if there is no number.
+double leading_number(const std::string& flag, const std::string& expected, const std::string& text, std::string& rest,
+                      const std::string& whole) {
     double value = 0;
     const char* end = text.data() + text.size();
     const auto [stop, error] = std::from_chars(text.data() + (text.starts_with('+') ? 1 : 0), end, value);
-    if (error != std::errc()) bad_text(flag, expected, text);
+    if (error != std::errc()) bad_text(flag, expected, whole);
     if (!std::isfinite(value))
         throw Error(Errc::InvalidOptions, flag + ": expected a finite number, got '" + text + "'", flag);
     rest.assign(stop, end);
@@ -37,7 +38,7 @@ std::vector<double> numbers(const std::string& flag, const std::string& expected
         item.erase(0, item.find_first_not_of(" \t"));
         item.erase(item.find_last_not_of(" \t") + 1);
         std::string rest;
-        values.push_back(leading_number(flag, expected, item, rest));
+        values.push_back(leading_number(flag, expected, item, rest, text));
         if (!rest.empty()) bad_text(flag, expected, text);
         begin = comma + 1;
     }
@@ -58,7 +59,7 @@ WorldBox to_box(const std::string& flag, const std::vector<double>& v) {
 Length parse_length(const std::string& flag, const std::string& text) {
     const std::string expected = "a length in world units, or in voxels as 3vx";
     std::string rest;
-    Length length{leading_number(flag, expected, text, rest), rest == "vx", true};
+    Length length{leading_number(flag, expected, text, rest, text), rest == "vx", true};
     if (!rest.empty() && rest != "vx") bad_text(flag, expected, text);
     if (length.value < 0) throw Error(Errc::InvalidOptions, flag + ": expected a length >= 0, got " + text, flag);
     return length;
@@ -67,7 +68,7 @@ Length parse_length(const std::string& flag, const std::string& text) {
 double parse_number(const std::string& flag, const std::string& text) {
     const std::string expected = "a number";
     std::string rest;
-    const double value = leading_number(flag, expected, text, rest);
+    const double value = leading_number(flag, expected, text, rest, text);
     if (!rest.empty()) bad_text(flag, expected, text);
     return value;
 }
@@ -103,7 +104,8 @@ StartChoice parse_start(const std::string& flag, const std::string& text) {
         if (kind == "mask") return {MaskStart{}, rest};
         if (kind == "vdb") return {LevelSetStart{}, rest};
     }
-    bad_text(flag, "auto, guess, tag, sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1, mesh:FILE, mask:FILE or vdb:FILE", text);
+    bad_text(flag, "auto, guess, cloud, tag, sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1, mesh:FILE, mask:FILE or vdb:FILE",
+             text);
 }
 
 FrameChoice parse_frames(const std::string& flag, const std::string& text) {
@@ -137,7 +139,7 @@ Named split_name(const std::string& text) {
 std::uint64_t parse_bytes(const std::string& flag, const std::string& text) {
     const std::string expected = "a size such as 8G or 512M";
     std::string rest;
-    double value = leading_number(flag, expected, text, rest);
+    double value = leading_number(flag, expected, text, rest, text);
     if (rest.size() == 2 && (rest[1] == 'B' || rest[1] == 'b')) rest.pop_back();
     const std::string units = "kmgt";
     if (!rest.empty()) {

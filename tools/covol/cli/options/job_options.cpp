@@ -58,7 +58,8 @@ bool is_flag(const CLI::Option& option) { return option.get_expected_max() == 0;
 
 void check_value(const CLI::Option& option, const std::string& name, const std::string& value,
                  const std::string& source) {
-    if (value.empty() || value.find('\0') != std::string::npos) refuse(source, name, "expected a value, got none");
+    if (value.empty()) refuse(source, name, "expected a value, got none");
+    if (value.find('\0') != std::string::npos) refuse(source, name, "expected a value without null characters");
     // CLI11 would split a text in brackets into several values.
     if (option.get_allow_extra_args() && value.front() == '[' && value.back() == ']')
         refuse(source, name, "expected one value, got the list " + value);
@@ -93,7 +94,7 @@ const CLI::Option& option_of_job(const CLI::App& command, const std::string& nam
     if (role_of(*option) == OptionRole::Conduct)
         throw Error(Errc::Unsupported,
                     source + ": it contains --" + name +
-                        ", which controls how a run continues and is allowed on the command line only");
+                        ", which controls how a run proceeds and is allowed on the command line only");
     return *option;
 }
 
@@ -141,7 +142,7 @@ JobOptions job_from_json(const Json& json, const std::string& source) {
             job.values.emplace_back(name, values.get<std::vector<std::string>>());
         return job;
     } catch (const Json::exception& error) {
-        throw Error(Errc::InvalidInput, source + ": expected a job, a command and its options: " + error.what());
+        throw Error(Errc::InvalidInput, source + ": expected a job with its command and its options: " + error.what());
     }
 }
 

@@ -110,7 +110,7 @@ void check_blanks(const std::vector<std::string>& words) {
         const std::string got = ", got '" + words[n - 1] + " " + words[n] + "'";
         throw UsageError(words[n - 2] + ": " +
                          (voxels ? "expected a length in voxels without a blank, " + words[n - 1] + "vx" + got
-                                 : "expected a number alone: lengths are in the image's own unit" + got));
+                                 : "expected a number alone: lengths are in the unit of the input" + got));
     }
 }
 

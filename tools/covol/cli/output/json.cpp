@@ -26,9 +26,13 @@ Json parse_json(const std::string& text, const std::string& what) {
 
 Json read_json(const std::string& path, std::uintmax_t max_bytes) {
     std::error_code status;
-    if (!std::filesystem::is_regular_file(path, status) || std::filesystem::file_size(path, status) > max_bytes)
+    if (!std::filesystem::is_regular_file(path, status))
         throw Error(Errc::Io,
-                    path + ": cannot read; expected a file of at most " + std::to_string(max_bytes >> 20U) + " MiB");
+                    path + ": cannot read: " +
+                        (std::filesystem::exists(path, status) ? "it is not a regular file" : "no such file"));
+    if (std::filesystem::file_size(path, status) > max_bytes)
+        throw Error(Errc::Io,
+                    path + ": cannot read: expected a file of at most " + std::to_string(max_bytes >> 20U) + " MiB");
     std::ifstream file(path, std::ios::binary);
     const std::string text{std::istreambuf_iterator<char>(file), {}};
     if (!file) throw Error(Errc::Io, path + ": cannot read");

@@ -24,7 +24,8 @@ extern "C" void on_signal(int signal) {
 /// Called if a page of a mapped file does not exist any more, because another program truncated the file. Finished
 /// outputs are kept; the temporary files of this run are removed by the next run.
 extern "C" void on_bus_error(int) {
-    constexpr char kText[] = "covol: error: a file that is being read was cut short by another program; run it again\n";
+    constexpr char kText[] =
+        "covol: error: a file that is being read was cut short by another program; run covol again\n";
     static_cast<void>(!::write(STDERR_FILENO, kText, sizeof kText - 1));
     ::_exit(kIo);
 }

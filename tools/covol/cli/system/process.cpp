@@ -28,7 +28,7 @@ std::string too_few_files() {
     }
     if (limit.rlim_cur >= kMin) return {};
     return "this process may open " + std::to_string(limit.rlim_cur) + " files at once (ulimit -n), expected " +
-           std::to_string(kMin) + " or more: Too many open files";
+           std::to_string(kMin) + " or more; otherwise the run would fail with Too many open files";
 }
 
 void catch_signals(void (*handler)(int)) {
