@@ -371,7 +371,8 @@ double max_seconds_for_pixels(std::uint64_t bytes) {
 
 std::optional<Error> reading_error(const PieceOutcome& trial, const std::string& path, const char* library) {
     if (!trial.crashed) return trial.refused;
-    return Error(Errc::InvalidInput, path + ": damaged: the " + library + " library cannot read it");
+    return Error(Errc::InvalidInput, path + ": probably damaged: the " + library +
+                                         " library crashed or took too long when it read the file");
 }
 
 }  // namespace covol::detail
