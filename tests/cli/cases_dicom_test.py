@@ -247,7 +247,7 @@ class Slices(Case):
         folder.mkdir()
         (folder / "notes").write_text("\x08 is no group\n" * 40)
         (folder / "zeros").write_bytes(bytes(4000))
-        self.assertIn("neither a DICOM image", self.refused("info", "series"))
+        self.assertIn("neither a usable DICOM image", self.refused("info", "series"))
 
     def test_a_tilted_gantry(self):
         self.series(ImagePositionPatient=lambda k: [3, -4 + 0.25 * k, 5 + k])

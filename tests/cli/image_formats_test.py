@@ -312,6 +312,17 @@ class Options(Case):
         next(p for p in folder.iterdir() if pydicom.dcmread(str(p)).ImagePositionPatient[2] == ORIGIN[2] + 6 * SPACING[2]).unlink()
         self.assertIn("a slice is missing", self.run_covol("info", folder, code=3).stderr)
 
+    def test_a_displaced_slice_is_an_error(self):
+        folder = write_dicom_series(self.folder / "displaced", self.data)
+        for path in folder.iterdir():
+            slice_ = pydicom.dcmread(str(path))
+            if slice_.ImagePositionPatient[2] == ORIGIN[2] + 6 * SPACING[2]:
+                slice_.ImagePositionPatient[2] += 0.3 * SPACING[2]
+                slice_.save_as(str(path))
+        error = self.run_covol("info", folder, code=3).stderr
+        self.assertIn("resample the image to equal distances", error)
+        self.assertNotIn("missing", error)
+
     def test_a_missing_module_is_an_error(self):
         """libcovol alone, without the folder of modules next to it."""
         loaded = subprocess.run(["ldd", COVOL], capture_output=True, text=True, check=True).stdout

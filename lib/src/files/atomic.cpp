@@ -38,6 +38,22 @@ std::string new_file_beside(const fs::path& target, mode_t mode) {
     }
 }
 
+/// Calls write(temporary). In messages of its errors, `path` replaces the name of the temporary file or folder.
+void write_as(const std::string& path, const std::string& temporary,
+              const std::function<void(const std::string&)>& write) {
+    try {
+        write(temporary);
+    } catch (const Error& error) {
+        std::string text = error.what();
+        std::size_t at = 0;
+        while ((at = text.find(temporary, at)) != std::string::npos) {
+            text.replace(at, temporary.size(), path);
+            at += path.size();
+        }
+        throw Error(error.code(), text, error.option());
+    }
+}
+
 }  // namespace
 
 void write_folder_atomically(const std::string& path, bool may_replace,
@@ -50,7 +66,7 @@ void write_folder_atomically(const std::string& path, bool may_replace,
     const ScratchFolder scratch(target.parent_path());
     const std::string temporary = (scratch.path() / target.filename()).string();
     if (!fs::create_directory(temporary, status)) throw Error(Errc::Io, path + ": cannot write: " + status.message());
-    write(temporary);
+    write_as(path, temporary, write);
     // All files of the new folder are flushed to the disk before it is renamed.
     const int folder = ::open(temporary.c_str(), O_RDONLY | O_DIRECTORY);
     const bool flushed = folder >= 0 && ::syncfs(folder) == 0;
@@ -75,7 +91,7 @@ void write_atomically(const std::string& path, const std::function<void(const st
         const std::string& name;
         ~Remover() { ::unlink(name.c_str()); }
     } remover{temporary};
-    write(temporary);
+    write_as(path, temporary, write);
     const int file = ::open(temporary.c_str(), O_RDONLY);
     const bool flushed = file >= 0 && ::fsync(file) == 0;
     const int why = errno;

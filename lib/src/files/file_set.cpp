@@ -117,8 +117,10 @@ void FileSet::write(const std::string& path, const std::function<void(const std:
     }
     std::error_code status;
     if (fs::exists(target, status) && fs::is_directory(target, status) != fs::is_directory(temporary, status))
-        throw Error(Errc::Io,
-                    path + ": cannot write: expected a file in place of a file and a folder in place of a folder");
+        throw Error(Errc::Io, path + ": cannot write: it is a " +
+                                  (fs::is_directory(target, status) ? "folder, which a file cannot replace"
+                                                                    : "file, which a folder cannot replace") +
+                                  "; choose another name");
     state_->files.push_back({path, std::move(target), temporary});
 }
 

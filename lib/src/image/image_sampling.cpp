@@ -180,10 +180,10 @@ void Image::sample(const Domain& frame, const Index3& min, const Index3& max, fl
     if (chunks_ || held_ != detail::whole_box(geometry_.size)) {
         const VoxelBox needed = needed_voxels(map, geometry_.size, min, max);
         if (!held_.contains(needed.min) || !held_.contains(needed.max))
-            throw Error(
-                Errc::InvalidInput,
-                "sample: " + path_ + ": voxels outside the part that was read are needed; choose a larger `roi`",
-                "roi");
+            throw Error(Errc::InvalidInput,
+                        (path_.empty() ? "image" : path_) +
+                            ": voxels outside the part that was read are needed; choose a larger `roi`",
+                        "roi");
         if (chunks_) box = needed;
     }
     detail::with_pixel_type(type_, [&](auto pixel) {

@@ -129,7 +129,8 @@ struct Pipe {
     Pipe() {
         int ends[2];
         if (pipe2(ends, O_CLOEXEC) != 0)
-            throw Error(Errc::Io, std::string("expected a pipe, got: ") + std::strerror(errno));
+            throw Error(Errc::Io, std::string("no pipe to covol's reader process could be created: ") +
+                                      std::strerror(errno) + "; allow more open files (ulimit -n)");
         from = ends[0];
         to = above_inherited(ends[1]);
     }
@@ -183,10 +184,10 @@ public:
         pid_t process = 0;
         const int why = posix_spawn(&process, program.c_str(), &files_, &attributes_, arguments, environment);
         if (why != 0)
-            throw Error(Errc::Io,
-                        program + ": covol's reader, the process that decodes files, could not be started: " +
-                            std::strerror(why) +
-                            (why == ENOENT ? "; install covol again" : "; allow more processes, threads or memory"));
+            throw Error(Errc::Io, program + ": covol's reader, the process that decodes files, could not be started: " +
+                                      std::strerror(why) +
+                                      (why == EAGAIN || why == ENOMEM ? "; allow more processes, threads or memory"
+                                                                      : "; install covol again"));
         return process;
     }
 
@@ -247,9 +248,10 @@ std::size_t run_program(const std::string& program, const Orders& orders, const 
     // The program has ended before it began this piece, so the file is not the reason. For example, a library may have
     // been unable to start a thread when it was loaded.
     if (batch.slots[n].now() != kBegun)
-        throw Error(Errc::Io, program +
-                                  ": the reader process ended before it could read a file; "
-                                  "allow more processes, threads or memory");
+        throw Error(Errc::Io,
+                    program +
+                        ": the reader process ended before it could read a file; "
+                        "allow more processes, threads or memory, or, if it happens every time, install covol again");
     batch.slots[n].set(kCrashed);
     return n + 1;
 }
@@ -369,7 +371,8 @@ double max_seconds_for_pixels(std::uint64_t bytes) {
 
 std::optional<Error> reading_error(const PieceOutcome& trial, const std::string& path, const char* library) {
     if (!trial.crashed) return trial.refused;
-    return Error(Errc::InvalidInput, path + ": damaged: the " + library + " library cannot read it");
+    return Error(Errc::InvalidInput, path + ": probably damaged: the " + library +
+                                         " library crashed or took too long when it read the file");
 }
 
 }  // namespace covol::detail

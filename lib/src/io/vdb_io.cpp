@@ -216,15 +216,14 @@ std::string list_grids(const Reader& reader) {
     return list.empty() ? "no grid at all" : list;
 }
 
-void check_grids(const std::string& function, const std::string& path, const std::vector<FloatGridPtr>& grids) {
+void check_grids(const std::string& path, const std::vector<FloatGridPtr>& grids) {
     std::set<std::string> names;
     for (const FloatGridPtr& grid : grids) {
-        if (!grid) throw Error(Errc::InvalidInput, function + ": " + path + ": expected a grid, got a null pointer");
+        if (!grid) throw Error(Errc::InvalidInput, path + ": expected a grid, got a null pointer");
         if (grid->getName().empty())
-            throw Error(Errc::InvalidInput, function + ": " + path + ": expected a name for every grid, got none");
+            throw Error(Errc::InvalidInput, path + ": expected a name for every grid, got none");
         if (!names.insert(grid->getName()).second)
-            throw Error(Errc::InvalidInput,
-                        function + ": " + path + ": expected unique names, got '" + grid->getName() + "' twice");
+            throw Error(Errc::InvalidInput, path + ": expected unique names, got '" + grid->getName() + "' twice");
     }
 }
 
@@ -336,7 +335,7 @@ void check_place(const std::string& path, const FloatGrid& grid) {
 
 void write_vdb(const std::string& path, const std::vector<FloatGridPtr>& grids, const WriteVdbOptions& options) {
     require_valid(options, "write_vdb");
-    check_grids("write_vdb", path, grids);
+    check_grids(path, grids);
     vdb::initialize();
     const auto add_provenance = [&](vdb::MetaMap& metadata) {
         for (const auto& [key, value] : options.metadata) metadata.insertMeta(key, vdb::StringMetadata(value));
@@ -365,7 +364,7 @@ void write_vdb(const std::string& path, const std::vector<FloatGridPtr>& grids, 
 }
 
 void write_nvdb(const std::string& path, const std::vector<FloatGridPtr>& grids) {
-    check_grids("write_nvdb", path, grids);
+    check_grids(path, grids);
     detail::write_atomically(path, [&](const std::string& temporary) {
         with_openvdb(Errc::Io, path + ": cannot write", [&] { detail::write_nanovdb(temporary, path, grids); });
     });

@@ -96,8 +96,8 @@ public:
         const std::vector<OmeAxis> axes = ome_ ? ome_->axes : axes_without_ome(array_);
         if (axes.size() != array_.shape.size())
             throw read_error(Errc::InvalidInput, ome_ ? ome_->metadata : array_.metadata,
-                             "expected an axis for each dimension, got " + std::to_string(axes.size()) + " for " +
-                                 std::to_string(array_.shape.size()));
+                             "expected an axis for each dimension, got " + std::to_string(axes.size()) + " axes for " +
+                                 std::to_string(array_.shape.size()) + " dimensions");
         letters_ = letters_of(array_.metadata, axes);
         axes_ = describe_axes(array_.metadata, letters_, array_, info_);
         if (ome_)
@@ -128,7 +128,10 @@ private:
                 folder = only_image_of(folder);
                 info_.fields.emplace_back("bioformats2raw.layout", "the only image is " + folder);
                 if (!is_zarr_array(folder)) ome_ = read_ome_image(folder);
-                if (!ome_) throw read_error(Errc::Unsupported, folder, "expected an image");
+                if (!ome_)
+                    throw read_error(
+                        Errc::Unsupported, folder,
+                        "expected an image (a group with multiscales), got an array or a group without them");
             }
             array_ = read_zarr_array(path_within(ome_->metadata, ome_->group, ome_->levels.front().path));
             return;

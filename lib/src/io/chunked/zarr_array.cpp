@@ -288,7 +288,10 @@ void ArrayReader::read_codecs(const Json& codecs) {
             read_shards(member(codec, "configuration"));
             has_bytes = true;
         } else {
-            throw unsupported("expected the codecs transpose, bytes or sharding_indexed, got " + quote(name));
+            throw unsupported(
+                "expected codecs that begin with bytes, with sharding_indexed, or with one transpose and then bytes, "
+                "got " +
+                quote(name));
         }
         if (name == "sharding_indexed" && &codec != &codecs.back())
             throw unsupported("expected shards that are not compressed themselves, got " +

@@ -27,8 +27,8 @@ struct Packed {
     /// @throws Error InvalidInput if a header claims more bytes than the maximum.
     void check_claim(const char* codec, std::uint64_t claimed) const {
         if (claimed > maximum)
-            throw damaged(codec, "expected " + std::to_string(maximum) + " bytes when unpacked, its header says " +
-                                     std::to_string(claimed));
+            throw damaged(codec, "expected at most " + std::to_string(maximum) +
+                                     " bytes when unpacked, but its header claims " + std::to_string(claimed));
     }
 };
 
@@ -91,7 +91,8 @@ Bytes unpack_deflate(const Packed& packed) {
     constexpr int kAnyHeader = 15 + 32;
     constexpr std::uint64_t kPiece = 1U << 30;
     z_stream stream{};
-    if (inflateInit2(&stream, kAnyHeader) != Z_OK) throw packed.damaged("zlib", "zlib could not be initialised");
+    if (inflateInit2(&stream, kAnyHeader) != Z_OK)
+        throw read_error(Errc::InvalidInput, packed.path, "zlib could not be initialised");
     const std::unique_ptr<z_stream, int (*)(z_stream*)> end(&stream, inflateEnd);
     Bytes out(packed.maximum);
     char more = 0;  // receives one byte when `out` is full, so that excess output is detected
@@ -107,8 +108,8 @@ Bytes unpack_deflate(const Packed& packed) {
         const std::uint64_t taken = in_before - stream.avail_in, made = out_before - stream.avail_out;
         read += taken;
         if (room == 0 && made > 0)
-            throw packed.damaged("zlib",
-                                 "expected " + std::to_string(packed.maximum) + " bytes when unpacked, got more");
+            throw packed.damaged(
+                "zlib", "expected at most " + std::to_string(packed.maximum) + " bytes when unpacked, got more");
         written += made;
         if (status == Z_STREAM_END) {
             // The data may consist of several gzip streams, one after another.
@@ -133,7 +134,8 @@ Bytes unpack_lz4(const Packed& packed) {
     Bytes out(claimed);
     const int got = LZ4_decompress_safe(in.data() + kHeader, out.data(), int(in.size() - kHeader), int(claimed));
     if (got < 0 || std::uint64_t(got) != claimed)
-        throw packed.damaged("lz4", "expected " + std::to_string(claimed) + " bytes, as its header says");
+        throw packed.damaged(
+            "lz4", "it cannot be unpacked to the " + std::to_string(claimed) + " bytes that its header claims");
     return out;
 }
 

@@ -48,7 +48,9 @@ std::map<std::string, std::vector<DicomSlice>> list_series(const fs::path& folde
     // of the series, only this warning reports it.
     if (passed_over > 0)
         run.warn(why + "; skipped" +
-                 (passed_over > 1 ? ", and " + std::to_string(passed_over - 1) + " other files of the folder" : "") +
+                 (passed_over > 1 ? ", and " + std::to_string(passed_over - 1) +
+                                        (passed_over > 2 ? " other files" : " other file") + " of the folder"
+                                  : "") +
                  ": if it is a slice at an end of the series, it is missing from the image");
     return series;
 }
@@ -221,12 +223,13 @@ std::vector<DicomSlice> read_dicom_series(const std::string& path, const RunCont
         throw read_error(
             Errc::InvalidInput, path,
             "expected a DICOM series, or a Zarr store (.zarray, .zgroup, .zattrs or zarr.json), got a folder "
-            "that contains neither a DICOM image nor any of these files");
+            "that contains neither a usable DICOM image nor any of these files");
     if (series.size() > 1) {
         std::string list;
         for (const auto& [uid, slices] : series)
-            list += (list.empty() ? "" : "; ") + std::to_string(slices.size()) + " slices of " +
-                    slices.front().description + " (" + fs::path(slices.front().path).filename().string() + ")";
+            list += (list.empty() ? "" : "; ") + std::to_string(slices.size()) +
+                    (slices.size() > 1 ? " slices of " : " slice of ") + slices.front().description + " (" +
+                    fs::path(slices.front().path).filename().string() + ")";
         throw read_error(Errc::Unsupported, path,
                          "expected one DICOM series, got " + std::to_string(series.size()) + ": " + list +
                              "; give a file of the series that is to be read");

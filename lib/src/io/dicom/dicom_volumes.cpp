@@ -122,11 +122,13 @@ void check_gaps(const std::string& path, const Slices& slices) {
     const double usual = sorted[sorted.size() / 2];
     for (std::size_t k = 0; k < gaps.size(); ++k) {
         if (std::abs(gaps[k] - usual) <= 0.02 * usual && usual > 0) continue;
-        throw read_error(Errc::InvalidInput, path,
-                         "expected equidistant slices, got a distance of " + number(gaps[k]) + " between " +
-                             name_of(slices[k]) + " and " + name_of(slices[k + 1]) + " instead of " + number(usual) +
-                             (gaps[k] > 0 ? ": a slice is missing"
-                                          : ": several volumes in one series; put one into a folder of its own"));
+        throw read_error(
+            Errc::InvalidInput, path,
+            "expected equidistant slices, got a distance of " + number(gaps[k]) + " between " + name_of(slices[k]) +
+                " and " + name_of(slices[k + 1]) + " instead of " + number(usual) +
+                (!(gaps[k] > 0 && usual > 0)       ? ": several volumes in one series; put one into a folder of its own"
+                 : std::round(gaps[k] / usual) > 1 ? ": a slice is missing"
+                                                   : ": resample the image to equal distances"));
     }
 }
 
@@ -195,9 +197,10 @@ std::vector<DicomVolume> dicom_volumes(const std::string& path, Slices slices) {
         if (slice.size == first.size && slice.components == first.components &&
             (one_file || same_direction(slice, first)))
             continue;
-        throw read_error(Errc::Unsupported, path,
-                         "the slices of the series differ in size or orientation: " + name_of(first) + " and " +
-                             name_of(slice) + "; give a folder with the slices of one volume");
+        throw read_error(
+            Errc::Unsupported, path,
+            "the slices of the series differ in size, orientation or number of channels: " + name_of(first) + " and " +
+                name_of(slice) + "; give a folder with the slices of one volume");
     }
     std::vector<DicomVolume> volumes = split_by_direction({std::move(slices), ""});
     volumes = split_by(volumes, "stack", &DicomSlice::stack, false);
@@ -213,7 +216,8 @@ void place_dicom_volume(const std::string& path, DicomVolume& volume, ImageInfo&
     if (placed > 0 && placed < slices.size())
         throw read_error(Errc::InvalidInput, path,
                          "expected a position of each slice, got " + std::to_string(placed) + " of " +
-                             std::to_string(slices.size()) + " with ImagePositionPatient (0020,0032)");
+                             std::to_string(slices.size()) +
+                             " with ImagePositionPatient (0020,0032) or SliceLocation (0020,1041)");
     info.fields = {{"PixelSpacing (0028,0030)", "the spacing along x and y"},
                    {"ImageOrientationPatient (0020,0037)", "the direction"}};
     ImageGeometry& g = info.geometry;

@@ -144,7 +144,8 @@ void Hdf5Dataset::read_shape(hid_t space) {
     const int count = H5Sget_simple_extent_type(space) == H5S_SIMPLE ? H5Sget_simple_extent_ndims(space) : 0;
     if (count < 3 || count > kMaxDimensions)
         throw read_error(Errc::InvalidInput, path_,
-                         "expected a dataset of 3 dimensions or a few more, got " + std::to_string(count));
+                         "expected a dataset of 3 to " + std::to_string(kMaxDimensions) + " dimensions, got " +
+                             std::to_string(count));
     std::vector<hsize_t> shape(static_cast<std::size_t>(count));
     H5Sget_simple_extent_dims(space, shape.data(), nullptr);
     for (const hsize_t n : shape) {
@@ -268,7 +269,7 @@ std::optional<Bytes> Hdf5Dataset::packed_chunk(const std::vector<std::uint64_t>&
     const std::uint64_t expected = array_.chunk_bytes();
     if (stored > file_->bytes() || stored > (filters_.empty() ? expected : max_packed_bytes(expected)))
         throw damaged("expected a chunk of " + std::to_string(expected) + " bytes when unpacked, got " +
-                      std::to_string(stored) + " bytes");
+                      std::to_string(stored) + " packed bytes");
     Bytes packed(stored);
     std::uint32_t mask = 0;
     if (H5Dread_chunk(dataset_.get(), H5P_DEFAULT, offset.data(), &mask, packed.data()) < 0)

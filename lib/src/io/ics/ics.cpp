@@ -187,7 +187,7 @@ IcsAxes axes_of(const std::string& path, const IcsHeader& header) {
         }
         if (sizes[n] < 1 || sizes[n] > std::uint64_t(kMaxVolumes))
             throw read_error(Errc::InvalidInput, path,
-                             "expected 1 to 2^20 frames and channels, the header claims " + texts[n]);
+                             "expected 1 to 2^20 frames and channels, but the header claims " + texts[n]);
         if (is_channel) axes.channels_first = !has_frames;
         seen = true;
         (is_channel ? axes.channels : axes.frames) = static_cast<int>(sizes[n]);
@@ -328,7 +328,7 @@ std::unique_ptr<ImageFile> open_ics(const std::string& path) {
         place.file_offset = header.end();
     }
     if (axes.channels > kMaxVolumes / axes.frames)
-        throw read_error(Errc::InvalidInput, path, "expected 1 to 2^20 volumes, the header claims more");
+        throw read_error(Errc::InvalidInput, path, "expected 1 to 2^20 volumes, but the header claims more");
     ImageInfo volumes = info;
     volumes.channels = 1;
     volumes.frames = axes.channels * axes.frames;

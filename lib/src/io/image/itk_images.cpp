@@ -241,7 +241,7 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path, const RunContext& r
     const std::uint64_t channels = image.components;
     if (frames < 1 || frames > kMax || channels < 1 || channels > kMax)
         throw read_error(Errc::InvalidInput, path,
-                         "expected 1 to 2^20 frames and channels, the header claims " + std::to_string(frames) +
+                         "expected 1 to 2^20 frames and channels, but the header claims " + std::to_string(frames) +
                              " frames and " + std::to_string(channels) + " channels");
     info.frames = static_cast<int>(frames);
     info.channels = static_cast<int>(channels);
@@ -266,9 +266,9 @@ std::unique_ptr<ImageFile> open_itk(const std::string& path, const RunContext& r
     constexpr std::uint64_t kMaxPixels = std::uint64_t(1) << 48;
     if (std::uint64_t(info.channels) * std::uint64_t(info.frames) > kMaxPixels / voxel_count(info.geometry.size))
         throw read_error(Errc::InvalidInput, path,
-                         "the header claims " + size_text(info.geometry.size) + " voxels of " +
-                             std::to_string(info.channels) + " channels and " + std::to_string(info.frames) +
-                             " frames");
+                         "expected at most 2^48 values, but the header claims " + size_text(info.geometry.size) +
+                             " voxels of " + std::to_string(info.channels) + " channels and " +
+                             std::to_string(info.frames) + " frames");
     const bool detached = header && !header->data_file().empty();
     auto file = std::make_unique<ItkFile>(path, unusable, info, image.size, std::move(reader),
                                           detached ? 0 : fs::file_size(path));

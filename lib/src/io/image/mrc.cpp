@@ -87,7 +87,7 @@ std::array<int, 3> axes_of(const std::string& path, const Header& header) {
     if (axes == std::array<int, 3>{0, 0, 0}) return {0, 1, 2};
     if (seen != 0b1110)
         throw read_error(Errc::InvalidInput, path,
-                         "expected MAPC, MAPR and MAPS to be 1, 2 and 3 in some order; damaged");
+                         "expected MAPC, MAPR and MAPS to be 1, 2 and 3 in some order; the header is damaged");
     for (int& axis : axes) --axis;
     return axes;
 }

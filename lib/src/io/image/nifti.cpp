@@ -214,9 +214,10 @@ public:
         }
         use(by_sform ? sform : by_qform ? qform : base_of(header_, info_.geometry.size), by_sform);
         info_.fields.emplace_back("place of the voxels",
-                                  by_sform   ? "the sform, because sform_code > 0"
-                                  : by_qform ? "the qform, because sform_code is 0"
-                                             : "pixdim, with the image's centre at 0, because both codes are 0");
+                                  by_sform    ? "the sform, because sform_code > 0"
+                                  : scode > 0 ? "the qform, because the sform is not invertible"
+                                  : by_qform  ? "the qform, because sform_code is 0"
+                                              : "pixdim, with the image's centre at 0, because both codes are 0");
         if (by_sform && qcode > 0) compare(sform, qform);
         if (by_sform) compare_steps();
     }
@@ -283,7 +284,9 @@ std::unique_ptr<ImageFile> open_nifti(const std::string& path, const RunContext&
     const std::optional<PixelPlace> place = nifti_pixels(header, begin, info);
     const std::array<std::uint64_t, 7> sizes = header.sizes();
     if (!place || sizes[4] > 1)
-        throw read_error(Errc::Unsupported, path, "expected a single-file NIfTI image with grey values");
+        throw read_error(Errc::Unsupported, path,
+                         "expected one file with a header and one integer of 8, 16 or 32 bits, float or double for "
+                         "each voxel; convert it, for example with nibabel");
     info.type = rescaled_nifti_type(*place);
     info.geometry.size = require_3d(path, {sizes[0], sizes[1], sizes[2]});
     info.geometry.unit = header.unit_name();
@@ -291,7 +294,7 @@ std::unique_ptr<ImageFile> open_nifti(const std::string& path, const RunContext&
     std::uint64_t frames = 1;
     for (std::size_t a = 3; a < sizes.size(); ++a)
         if (__builtin_mul_overflow(frames, sizes[a], &frames) || frames > kMax)
-            throw read_error(Errc::InvalidInput, path, "expected 1 to 2^20 frames, the header claims more");
+            throw read_error(Errc::InvalidInput, path, "expected 1 to 2^20 frames, but the header claims more");
     info.frames = static_cast<int>(frames);
     info.axis_order = header.dimensions() > 3 ? "XYZT" : "XYZ";
     NiftiPlace(path, header, info, run).fill();

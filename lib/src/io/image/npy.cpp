@@ -94,7 +94,7 @@ std::array<std::uint64_t, 3> shape_of(const std::string& path, const std::string
     if (sizes.size() != 3)
         throw read_error(Errc::Unsupported, path,
                          "expected an array of three axes z, y, x, got the shape " + quote(shape + ")") +
-                             "; save one channel of one frame");
+                             (sizes.size() > 3 ? "; save one channel of one frame" : ""));
     return {sizes[0], sizes[1], sizes[2]};
 }
 

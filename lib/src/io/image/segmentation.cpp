@@ -23,7 +23,8 @@ public:
         if (segment_.layer >= info_.channels)
             throw read_error(Errc::InvalidInput, path_,
                              "segment '" + segment_.name + "' refers to layer " + std::to_string(segment_.layer) +
-                                 " (from 0), the number of layers in the file is " + std::to_string(info_.channels));
+                                 " (from 0), but the number of layers in the file is " +
+                                 std::to_string(info_.channels));
         info_.type = PixelType::UInt8;
         info_.channels = 1;
         info_.channel_names.clear();

@@ -62,7 +62,9 @@ public:
         kind_ = current_page(*tiff_);
         info_.type = pixel_type(path, kind_);
         if (kind_.samples < 1 || kind_.bytes() > std::uint64_t(1) << 40)
-            throw read_error(Errc::InvalidInput, path, "the header claims pages of " + kind_.to_text());
+            throw read_error(
+                Errc::InvalidInput, path,
+                "expected pages of at most 1 TiB with 1 sample or more, but the header claims " + kind_.to_text());
         run.check();
         find_single_directory(facts.description);
         if (contiguous_ == 0) pages_ = list_pages(path, *tiff_);

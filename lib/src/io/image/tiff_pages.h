@@ -22,7 +22,7 @@ struct TiffPage {
     }
     [[nodiscard]] std::string to_text() const {
         return std::to_string(width) + " x " + std::to_string(height) + " with " + std::to_string(samples) +
-               " sample(s) of " + std::to_string(bits) + " bits";
+               " sample(s) of " + std::to_string(bits) + " bits in sample format " + std::to_string(format);
     }
     [[nodiscard]] std::uint64_t row_bytes() const { return std::uint64_t(width) * samples * (bits / 8); }
     [[nodiscard]] std::uint64_t bytes() const { return row_bytes() * height; }

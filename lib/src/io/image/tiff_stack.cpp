@@ -282,7 +282,8 @@ OmePixels read_ome_xml(const TiffFacts& facts, std::vector<std::string>& files) 
     std::error_code status;
     const std::uintmax_t bytes = fs::file_size(other, status);
     if (status || bytes > kLargest)
-        throw read_error(Errc::Io, facts.path, "its description lies in " + other.string() + ", which cannot be read");
+        throw read_error(Errc::Io, facts.path,
+                         "its description lies in " + other.string() + ", which cannot be read or exceeds 256 MiB");
     files.push_back(other.string());
     std::string xml(bytes, '\0');
     std::ifstream(other, std::ios::binary).read(xml.data(), static_cast<std::streamsize>(bytes));
@@ -383,7 +384,8 @@ void read_ome(const TiffFacts& facts, TiffStack& stack) {
     if (named && ome.channels.size() == stack.channels) stack.channel_names = ome.channels;
     if (stack.slices > kMaxPlanes || stack.channels > kMaxPlanes || stack.frames > kMaxPlanes ||
         stack.slices * stack.channels > kMaxPlanes || stack.slices * stack.channels * stack.frames > kMaxPlanes)
-        throw read_error(Errc::InvalidInput, facts.path, "its OME-XML claims more planes than there can be; damaged");
+        throw read_error(Errc::InvalidInput, facts.path,
+                         "expected at most 2^24 planes, but its OME-XML claims more; it is damaged");
     if (!ome.data.empty()) OmePlanes(facts, stack).assign(ome.data);
 }
 

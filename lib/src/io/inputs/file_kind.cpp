@@ -54,7 +54,8 @@ FileKind kind_of_file(const std::string& path) {
     const std::string end = ending_of(split_grid_name(path).path);
     if (end == ".vdb") return FileKind::Vdb;
     if (end == ".nvdb")
-        throw Error(Errc::Unsupported, path + ": NanoVDB files are for viewers and are not read; keep the .vdb");
+        throw Error(Errc::Unsupported,
+                    path + ": NanoVDB files are for viewers and are not read; give the .vdb instead");
     if (is_one_of(end, kPointEndings) || end == ".laz")
         return FileKind::Points;  // LAZ is not supported; the reader of points reports this
     if (end == ".dcm" && detail::dicom_class(path) == detail::kRtStructureSet) return FileKind::Points;

@@ -60,7 +60,7 @@ private:
         const std::uint32_t version = word(source_.bytes(4)), total = word(source_.bytes(4));
         if (version != 2) unsupported("version " + std::to_string(version) + " of glTF");
         if (total != text_.size())
-            source_.fail("the header promises " + std::to_string(total) + " bytes, the file has " +
+            source_.fail("the header promises " + std::to_string(total) + " bytes, but the file has " +
                          std::to_string(text_.size()));
         const std::uint32_t json_bytes = word(source_.bytes(4));
         if (source_.bytes(4) != "JSON") source_.fail("expected a chunk of JSON first");
@@ -84,7 +84,8 @@ private:
         const Json& all = list(key);
         if (!number.is_number_unsigned() || number.get<std::uint64_t>() >= all.size() ||
             !all[number.get<std::uint64_t>()].is_object())
-            source_.fail("there is no " + number.dump().substr(0, 40) + " among its " + key);
+            source_.fail("expected the number of one of its " + std::to_string(all.size()) + " " + key +
+                         ", from 0, got " + number.dump().substr(0, 40));
         return all[number.get<std::uint64_t>()];
     }
     /// An integer of a JSON object: a length, a position or a code; `otherwise` if the object does not have the key.
@@ -92,10 +93,10 @@ private:
     /// cannot overflow.
     std::uint64_t size(const Json& object, const char* key, std::uint64_t otherwise) const {
         const Json value = member(object, key, otherwise);
-        if (!value.is_number_unsigned() ||
-            value.get<std::uint64_t>() > std::max<std::uint64_t>(binary_.size(), 1 << 16))
-            source_.fail(std::string(key) + ": expected at most " + std::to_string(binary_.size()) +
-                         " bytes, the size of the data, got " + value.dump().substr(0, 40));
+        const std::uint64_t maximum = std::max<std::uint64_t>(binary_.size(), 1 << 16);
+        if (!value.is_number_unsigned() || value.get<std::uint64_t>() > maximum)
+            source_.fail(std::string(key) + ": expected a whole number up to " + std::to_string(maximum) + ", got " +
+                         value.dump().substr(0, 40));
         return value.get<std::uint64_t>();
     }
 

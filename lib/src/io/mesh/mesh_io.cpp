@@ -164,7 +164,7 @@ TriangleMesh read_mesh(const std::string& path) {
         throw Error(Errc::Unsupported,
                     path + ": expected a name that ends in .ply, .obj, .stl, .off or .glb, got '" + end + "'");
     const std::string text = read_file(path);
-    Source source("read_mesh", path, text);
+    Source source(path, text);
     const auto built = [&](void (*read)(Source&, Receiver&)) {
         MeshBuilder builder(source);
         read(source, builder);

@@ -16,9 +16,8 @@ namespace covol::mesh_io {
 /// A file in memory that is read as lines or as bytes. Error messages state the number of the line.
 class Source {
 public:
-    /// @param reader  name of the function, which messages begin with; path and text must outlive this object
-    Source(const char* reader, const std::string& path, std::string_view text)
-        : reader_(reader), path_(path), lines_(text) {}
+    /// @pre path and text outlive this object
+    Source(const std::string& path, std::string_view text) : path_(path), lines_(text) {}
 
     [[nodiscard]] bool at_end() const { return lines_.rest().empty(); }
     [[nodiscard]] std::size_t bytes_left() const { return lines_.rest().size(); }
@@ -79,10 +78,9 @@ public:
 private:
     [[noreturn]] void fail(Errc code, const std::string& what) const {
         const std::string line = is_text_ && lines_.number() > 0 ? ":" + std::to_string(lines_.number()) : "";
-        throw Error(code, std::string(reader_) + ": " + path_ + line + ": " + what);
+        throw Error(code, path_ + line + ": " + what);
     }
 
-    const char* reader_;
     const std::string& path_;
     detail::Lines lines_;
     bool is_text_ = true;

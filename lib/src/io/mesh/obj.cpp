@@ -1,4 +1,5 @@
 // Reads and writes OBJ meshes: vertices, their normals, and polygons. Other elements of a file are ignored.
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -27,8 +28,10 @@ void read_corners(const Source& source, std::string_view line, std::int64_t coun
     for (std::string_view word = next_word(line); !word.empty() && word[0] != '#'; word = next_word(line)) {
         const auto number = to_number<std::int64_t>(word.substr(0, word.find('/')));
         // Positive indices count from 1; negative indices count backwards from the last vertex so far.
-        if (!number || *number == 0) source.fail("expected the number of a vertex, got " + quote(word));
-        corners.push_back(to_index(source, double(*number > 0 ? *number - 1 : count + *number)));
+        if (!number || *number == 0 || *number < -count ||
+            *number > std::int64_t(std::numeric_limits<std::uint32_t>::max()))
+            source.fail("expected the number of a vertex, got " + quote(word));
+        corners.push_back(std::uint32_t(*number > 0 ? *number - 1 : count + *number));
     }
     if (corners.size() < 3)
         source.fail("expected a face of at least 3 vertices, got " + std::to_string(corners.size()));

@@ -76,8 +76,9 @@ TriangleMesh read_stl(Source& source, std::string_view text) {
         return mesh.finish();
     }
     if (text.size() < kHeader + kRecord * std::uint64_t(count) || text.size() < kHeader)
-        source.fail("the header promises " + std::to_string(count) + " triangles, the file of " +
-                    std::to_string(text.size()) + " bytes is too short");
+        source.fail("expected " + std::to_string(kHeader + kRecord * std::uint64_t(count)) +
+                    " bytes for the header and " + std::to_string(count) + " triangles, got " +
+                    std::to_string(text.size()) + "; the file is truncated, or not an STL file");
     for (std::uint32_t i = 0; i < count; ++i) {
         std::array<float, 12> record{};  // normal, three corners
         std::memcpy(record.data(), text.data() + kHeader + std::size_t(i) * kRecord, sizeof(record));

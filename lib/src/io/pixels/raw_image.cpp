@@ -317,7 +317,9 @@ Index3 require_3d(const std::string& path, const std::uint64_t (&size)[3]) {
     constexpr std::uint64_t kMaxVoxels = std::uint64_t(1) << 52;
     if (std::max({size[0], size[1], size[2]}) > std::uint64_t(std::numeric_limits<std::int32_t>::max()) / 2 ||
         size[0] * size[1] > kMaxVoxels / size[2])
-        throw read_error(Errc::InvalidInput, path, "the header claims " + text + " voxels");
+        throw read_error(
+            Errc::InvalidInput, path,
+            "expected at most 2^30 - 1 voxels along each axis and 2^52 in total, but the header claims " + text);
     return {static_cast<std::int32_t>(size[0]), static_cast<std::int32_t>(size[1]), static_cast<std::int32_t>(size[2])};
 }
 
@@ -330,16 +332,16 @@ std::shared_ptr<void> allocate_pixels(const std::string& path, std::uint64_t pix
                          "the header claims " + std::to_string(pixels) + " voxels, which a file of " +
                              std::to_string(file_bytes) + " bytes cannot hold; it is damaged or truncated");
     const std::uint64_t memory = std::uint64_t(::sysconf(_SC_PHYS_PAGES)) * std::uint64_t(::sysconf(_SC_PAGESIZE));
-    const auto refuse = [&] {
+    const auto refuse = [&](const std::string& why) {
         return read_error(Errc::Unsupported, path,
-                          "the image needs " + std::to_string(bytes >> 20) + " MiB, this machine has " +
-                              std::to_string(memory >> 20) + " MiB; choose a part with `roi`, or downsample it",
+                          "the image needs " + std::to_string(bytes >> 20) + " MiB, " + why +
+                              "; choose a part with `roi`, or downsample it",
                           "roi");
     };
-    if (bytes > memory) throw refuse();
+    if (bytes > memory) throw refuse("but this machine has " + std::to_string(memory >> 20) + " MiB");
     // malloc does not write to large blocks, so a block occupies physical memory only where pixels are written to it.
     void* data = std::malloc(std::max<std::uint64_t>(bytes, 1));
-    if (data == nullptr) throw refuse();
+    if (data == nullptr) throw refuse("which could not be allocated");
     return {data, std::free};
 }
 

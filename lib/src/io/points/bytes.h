@@ -25,7 +25,7 @@ public:
     [[nodiscard]] std::string_view part(std::uint64_t offset, std::uint64_t count) const {
         if (offset > data_.size() || count > data_.size() - offset)
             fail(name_, "expected " + std::to_string(count) + " bytes at byte " + std::to_string(offset) +
-                            ", the file has " + std::to_string(data_.size()) + "; it is truncated or damaged");
+                            ", but the file has " + std::to_string(data_.size()) + "; it is truncated or damaged");
         return data_.substr(offset, count);
     }
 

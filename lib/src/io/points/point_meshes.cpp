@@ -41,7 +41,7 @@ PointTable read_vertices(const char* rule, const std::string& path, const std::s
                          void (*read)(mesh_io::Source&, mesh_io::Receiver&)) {
     PointTable table;
     table.rule = rule;
-    mesh_io::Source source("read_points", path, content);
+    mesh_io::Source source(path, content);
     CloudBuilder builder(source, table);
     read(source, builder);
     if (read == mesh_io::read_ply && !builder.expects_vertices()) source.fail("expected an element 'vertex', got none");

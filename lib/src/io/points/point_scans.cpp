@@ -129,8 +129,9 @@ double pcd_value(const std::string& path, const char* data, const PcdField& fiel
     if (field.type == 'I' && field.size == 2) return load<std::int16_t>(data, kSwap);
     if (field.type == 'U' && field.size == 4) return load<std::uint32_t>(data, kSwap);
     if (field.type == 'U' && field.size == 2) return load<std::uint16_t>(data, kSwap);
-    throw Error(Errc::Unsupported, path + ": field " + quote(field.name) + ": expected 4 or 8 bytes of type F, got " +
-                                       std::to_string(field.size) + " of " + field.type);
+    throw Error(Errc::Unsupported, path + ": field " + quote(field.name) +
+                                       ": expected 4 or 8 bytes of type F, or 2 or 4 bytes of type I or U, got " +
+                                       std::to_string(field.size) + " of type " + field.type);
 }
 
 /// Unpacks Marc Lehmann's LZF: runs of literal bytes, and references to earlier output. Returns false if the data are
@@ -190,7 +191,10 @@ void read_pcd_ascii(const std::string& path, const PcdHeader& header, Lines& lin
         split(line, ' ', words);
         for (std::size_t a = 0; a < at.size(); ++a) {
             const auto value = column[a] < words.size() ? to_number(words[column[a]]) : std::nullopt;
-            if (!value) fail(path, lines.number(), "expected numbers for x, y and z, got " + quote(line));
+            if (!value)
+                fail(path, lines.number(),
+                     std::string("expected numbers for x, y and z") + (at.size() > 3 ? " and the normal" : "") +
+                         ", got " + quote(line));
             values[a] = *value;
         }
         add_valid(table, values, invalid);
@@ -315,7 +319,8 @@ PointTable parse_las(const std::string& path, const std::string& content) {
     if (minor == 4) count = bytes.at<std::uint64_t>(247);
     if (stride < 12 || begin > bytes.size() || count > (bytes.size() - begin) / stride)
         fail(path, "expected " + std::to_string(count) + " points of " + std::to_string(stride) + " bytes from byte " +
-                       std::to_string(begin) + ", the file has " + std::to_string(bytes.size()) + "; it is truncated");
+                       std::to_string(begin) + ", but the file has " + std::to_string(bytes.size()) +
+                       "; it is truncated");
     Vec3 scale, offset;
     for (std::uint64_t a = 0; a < 3; ++a) {
         scale[a] = bytes.at<double>(131 + 8 * a);

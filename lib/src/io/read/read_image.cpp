@@ -131,7 +131,7 @@ std::uint64_t choose(const std::string& path, const std::string& what, const std
                      const std::vector<std::string>& names, const std::string& advice = {}) {
     if (!wanted && count == 1) return 0;
     if (wanted && *wanted < count) return std::uint64_t(*wanted);
-    std::string list = "0 to " + std::to_string(count - 1);
+    std::string list = count == 1 ? "0" : "0 to " + std::to_string(count - 1);
     if (!names.empty()) {
         list.clear();
         for (std::size_t n = 0; n < names.size(); ++n)

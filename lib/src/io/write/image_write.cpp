@@ -102,7 +102,7 @@ void warn_of_losses(const std::string& path, const ImageGeometry& geometry, cons
                  (!is_tiff            ? "OME-Zarr 0.4"
                   : is_ome_tiff(path) ? "OME-TIFF"
                                       : "TIFF") +
-                 " cannot store that: the labels match its voxels, but their world coordinates differ; write .nrrd or "
+                 " cannot store that: voxel indices remain the same, but world coordinates differ; write .nrrd or "
                  ".nii.gz to keep the direction");
     if (extension == ".nii" || extension == ".nii.gz") check_precision(path, geometry, run);
     if (is_ome_tiff(path) && geometry.origin != Vec3{0, 0, 0})
@@ -126,7 +126,10 @@ void write_image(const std::string& given, const PixelSource& source, const Writ
     for (int a = 0; a < 3; ++a)
         if (geometry.size[a] < 1 || !(geometry.spacing[a] > 0))
             throw Error(Errc::InvalidInput,
-                        path + ": expected voxels along every axis, got " + detail::size_text(geometry.size));
+                        path + ": expected at least one voxel and a positive spacing along each axis, got " +
+                            detail::size_text(geometry.size) + " voxels with the spacing " +
+                            detail::number(geometry.spacing[0]) + ", " + detail::number(geometry.spacing[1]) + ", " +
+                            detail::number(geometry.spacing[2]));
     const std::string extension = detail::extension(path);
     warn_of_losses(path, geometry, run);
     with_threads(run, [&] {

@@ -178,7 +178,7 @@ std::string nifti_header(const std::string& path, const PixelSource& source, con
     for (const std::int32_t n : g.size)
         if (n > std::numeric_limits<std::int16_t>::max())
             throw Error(Errc::Unsupported, path + ": NIfTI-1 holds at most 32767 voxels along an " +
-                                               "axis, the image is " + size_text(g.size) +
+                                               "axis, but the image is " + size_text(g.size) +
                                                "; write .nrrd, .mha or .zarr");
     std::string header(352, '\0');
     const auto put = [&](std::size_t at, auto value) { std::memcpy(header.data() + at, &value, sizeof(value)); };

@@ -208,7 +208,7 @@ TEST_CASE("A DICOM series, given as a folder or as one of its files, is sorted b
     std::filesystem::remove(folder + "/7.dcm");
     CHECK(message_of([&] { (void)read_image(folder); }).find("a slice is missing") != std::string::npos);
     std::filesystem::create_directories(scratch.path("empty"));
-    CHECK(message_of([&] { (void)read_image(scratch.path("empty")); }).find("neither a DICOM image") !=
+    CHECK(message_of([&] { (void)read_image(scratch.path("empty")); }).find("neither a usable DICOM image") !=
           std::string::npos);
 }
 

@@ -13,6 +13,7 @@
 
 #include "base/file.h"
 #include "covol/error.h"
+#include "files/atomic.h"
 #include "io/write/image_writers.h"
 #include "io/write/pixel_blocks.h"
 #include "io/write/zarr_levels.h"
@@ -294,4 +295,12 @@ TEST_CASE("pad_rows moves voxels to their places in a larger lattice, and fills 
     const std::vector<std::uint8_t> expected{1, 2, 0, 3, 4, 0, 0, 0, 0, 5, 6, 0, 7, 8,
                                              0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     CHECK(values == expected);
+}
+
+TEST_CASE("Errors of a writer name the output, not the temporary file or folder") {
+    const Scratch scratch;
+    const std::string path = scratch.path("a.nrrd");
+    const auto refuse = [](const std::string& temporary) { throw Error(Errc::Io, temporary + ": cannot write"); };
+    CHECK_THROWS_WITH(detail::write_atomically(path, refuse), path + ": cannot write");
+    CHECK_THROWS_WITH(detail::write_folder_atomically(path, false, refuse), path + ": cannot write");
 }
