@@ -342,6 +342,10 @@ class Tools(Case):
         write_nrrd(bare, (SIZE,) * 3, bytes(255 * (v > 120) for v in ball_bytes()), spacing=1)
         self.assertLess(self.report("compare", "m.nrrd", bare)["compare"]["dice"], 0.5)
         self.assertGreater(self.report("compare", "m.nrrd", bare, "--spacing", f"{H},{H},{H}")["compare"]["dice"], 0.95)
+        # A part of the space can be compared only for label images.
+        self.segment(points=self.sparse)
+        error = self.run_covol("compare", "s.vdb", self.sparse, "--roi", "0,0,0,1,1,1", code=2).stderr
+        self.assertIn("expected two label images to crop", error)
 
     def test_info_of_each_kind(self):
         self.assertEqual(self.report("info", self.image)["image"]["size"], [SIZE] * 3)

@@ -110,7 +110,8 @@ def test_two_calls_at_once(sphere):
 @pytest.mark.parametrize("options, code, field", [
     ({"tau": -1}, "invalid_options", "tau"), ({"tau": "3px"}, "invalid_options", "tau"), ({"tau": []}, "invalid_options", "tau"),
     ({"theta": 2}, "invalid_options", "theta"), ({"model": "other"}, "invalid_options", "model"),
-    ({"max_steps": 1.5}, "invalid_options", "max_steps"), ({"hole_distance": -1}, "invalid_options", "hole_distance"),
+    ({"max_steps": 1.5}, "invalid_options", "max_steps"), ({"max_steps": "many"}, "invalid_options", "max_steps"),
+    ({"hole_distance": -1}, "invalid_options", "hole_distance"),
     ({"voxel_size": 0}, "invalid_options", "voxel_size"), ({"roi": (0, 0, 0)}, "invalid_options", "roi"),
     ({"init": "spher:1"}, "invalid_options", "init"), ({"threads": -1}, "invalid_options", "threads"),
     ({"points_space": "here"}, "invalid_options", "points_space"), ({"points": np.zeros((3, 2))}, "invalid_input", "points"),

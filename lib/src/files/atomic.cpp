@@ -45,11 +45,10 @@ void write_as(const std::string& path, const std::string& temporary,
         write(temporary);
     } catch (const Error& error) {
         std::string text = error.what();
-        std::size_t at = 0;
-        while ((at = text.find(temporary, at)) != std::string::npos) {
+        std::size_t at = text.find(temporary);
+        if (at == std::string::npos) throw;
+        for (; at != std::string::npos; at = text.find(temporary, at + path.size()))
             text.replace(at, temporary.size(), path);
-            at += path.size();
-        }
         throw Error(error.code(), text, error.option());
     }
 }

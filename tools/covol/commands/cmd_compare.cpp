@@ -37,6 +37,8 @@ struct CompareJob {
         if (points_a && points_b)
             throw Error(Errc::Unsupported,
                         "compare: expected points and a .vdb or a mesh, got points twice: " + a + " and " + b);
+        if ((points_a || points_b) && image.options.roi)
+            throw Error(Errc::InvalidOptions, "--roi: expected two label images to crop, got " + (points_a ? a : b));
         if (points_a) return measure_points(a, b, session);
         if (points_b) return measure_points(b, a, session);
         compare_solids(session);

@@ -34,7 +34,12 @@ std::string find_opener() {
 }
 
 BrowserLink::BrowserLink(const std::string& url) {
-    std::string name = (std::filesystem::temp_directory_path() / "covol-open-XXXXXX").string();
+    std::error_code failed;
+    const std::filesystem::path folder = std::filesystem::temp_directory_path(failed);
+    if (failed)
+        throw Error(Errc::Io, "mark: the folder for temporary files cannot be used: " + failed.message() +
+                                  "; set TMPDIR to a writable folder");
+    std::string name = (folder / "covol-open-XXXXXX").string();
     if (::mkdtemp(name.data()) == nullptr)
         throw Error(Errc::Io, "mark: cannot create the folder " + name + ": " + std::strerror(errno) +
                                   "; set TMPDIR to a writable folder");

@@ -64,7 +64,8 @@ def flags_of(function, options):
                             f"got {value!r}", "invalid_options", name)
             flags.append(f"--{name.replace('_', '-')}=" + ",".join(repr(float(x)) for x in numbers.ravel()))
         else:
-            if kind.startswith("int") and not (isinstance(value, (int, np.integer)) or float(value).is_integer()):
+            is_whole = isinstance(value, (int, np.integer)) or isinstance(value, (float, np.floating)) and float(value).is_integer()
+            if kind.startswith("int") and not is_whole:
                 raise Error(f"{name}: expected a whole number, got {value!r}", "invalid_options", name)
             flags.append(flag(name, value))
     return flags
