@@ -228,7 +228,7 @@ TEST_CASE("A repeated contour counts once and causes a warning") {
     REQUIRE(c.solid != nullptr);
     CHECK(c.solid->level({30, 30, 12}) == Approx(-10).margin(0.1));
     REQUIRE(warnings.lines.size() == 1);
-    CHECK(warnings.lines[0].find("5 contours are repeated") != std::string::npos);
+    CHECK(warnings.lines[0].find("5 contours repeat the marks") != std::string::npos);
 }
 
 TEST_CASE("Slices are across the axis with most contours, and contours in other planes count as marks") {

@@ -116,7 +116,7 @@ TEST_CASE("Exterior seeds closer than D to the points or outside of the domain a
         }
         return {};
     };
-    CHECK(message({20, 0, 0}).find("D = 2.5") != std::string::npos);
+    CHECK(message({20, 0, 0}).find("the tag distance, 2.5") != std::string::npos);
     CHECK(message({40, 0, 0}).find("in the domain") != std::string::npos);
 }
 
