@@ -10,7 +10,6 @@
 #include "cloud/orientation/attempts.h"
 #include "cloud/orientation/filled.h"
 #include "cloud/orientation/given_sides.h"
-#include "cloud/orientation/heuristics.h"
 #include "cloud/orientation/judge.h"
 #include "cloud/orientation/propagation.h"
 #include "cloud/orientation/stray.h"
