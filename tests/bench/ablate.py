@@ -8,7 +8,7 @@ A mechanism is switched off by COVOL_SCALE (base/heuristics.h), which makes its 
 
 - clouds: 16 shapes of reconstruct/compare.py, 5,000 points each, without noise and with 0.25 and 1 %; the error is the sum of both
   mean distances between mesh and truth in % of the diagonal (--rivals measures it). Needs COVOL_DATA for nine of the shapes.
-- marks: twelve structures of real images with 20 and with 60 marks (sensitivity_jobs.REAL); the error is 1 - Dice. Needs COVOL_DATA.
+- marks: the jobs of sensitivity_real.py on structures of real images whose error is 1 - Dice. Needs COVOL_DATA.
 - scans: the scenes of reconstruct/scenes.py (rooms, fronts of houses, terrain, bodies with edges) from points alone, from points with
   noise, and from points with normals; the error is the mean distance to the true surface and back in % of the spacing, plus the % of
   the area that faces the wrong side. With COVOL_DATA also four scanned objects, of which the genus is known; their error is the mean

@@ -29,7 +29,6 @@ CORRECTED, CORRECTED_COUNT = ("spinal cord", "ventricle", "caudate, right", "hip
 
 # Jobs by the kind of their input, for the lists of sensitivity_jobs.py.
 OF_OUTLINES = [f"{name} outlines" for name in OUTLINED]
-OF_MARKS = [f"{name} {count}" for count in REAL_COUNTS for name in REAL]
 FEW_MARKS = [f"{name} 20" for name in REAL[::2]] + [f"{name} 60" for name in REAL[1::2]]
 MARKS_ALONE = [f"{name} 20 alone" for name in ("spinal cord", "left atrium", "thalamus")]
 ASTRAY_MARKS = [f"{name} {DOUBT_COUNT} astray" for name in REAL[::4]]

@@ -92,7 +92,7 @@ COVOL_HEURISTICS ViewsHeuristics kViews{};
 /// Layers of a scan below others: layers.cpp.
 struct LayersHeuristics {
     /// [patches] Maximum number of patches that are reversed tentatively; each requires a solution of the indicator.
-    int max_patches = limit("layers.max_patches", 12);
+    double max_patches = limit("layers.max_patches", 12.0);
 };
 COVOL_HEURISTICS LayersHeuristics kLayers{};
 

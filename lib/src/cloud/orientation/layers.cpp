@@ -104,7 +104,7 @@ std::vector<char> turn_layers(WindingField& field, const std::vector<Vec3>& poin
     std::vector<char> turned(points.size(), 0);
     const PointCells cells(points, kCloud.coarse * between);
     std::vector<Patch> patches = Opposed(cells, free).patches();
-    patches.resize(std::min<std::size_t>(patches.size(), kLayers.max_patches));
+    patches.resize(std::min(patches.size(), std::size_t(kLayers.max_patches)));
     const double cell = field.indicator().stack().cell();
     double bare = Level(field, cells).bare;
     for (const Patch& patch : patches) {
