@@ -26,10 +26,10 @@ Json parse_json(const std::string& text, const std::string& what) {
 
 Json read_json(const std::string& path, std::uintmax_t max_bytes) {
     std::error_code status;
-    if (!std::filesystem::is_regular_file(path, status))
-        throw Error(Errc::Io,
-                    path + ": cannot read: " +
-                        (std::filesystem::exists(path, status) ? "it is not a regular file" : "no such file"));
+    const std::filesystem::file_status found = std::filesystem::status(path, status);
+    if (!std::filesystem::is_regular_file(found))
+        throw Error(Errc::Io, path + ": cannot read: " +
+                                  (std::filesystem::exists(found) ? "it is not a regular file" : status.message()));
     if (std::filesystem::file_size(path, status) > max_bytes)
         throw Error(Errc::Io,
                     path + ": cannot read: expected a file of at most " + std::to_string(max_bytes >> 20U) + " MiB");
