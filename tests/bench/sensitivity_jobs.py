@@ -133,9 +133,10 @@ def make_clouds(folder):
     write_points(folder / "normals_noisy.csv", points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
     write_points(folder / "needles.csv", draw("needles", 22, 0.5, count=2500)[0])
     write_points(folder / "thick.csv", draw("torus", 15, 0.7, count=5000)[0])
-    # Folds of a ball: those with 30 waves are mistaken for noise, those with 12 are resolved.
-    for waves, depth in ((30, 0.2), (12, 0.3)):
-        directions = np.random.default_rng(20).normal(size=(10000, 3))
+    # Folds of a ball: those with 30 waves are mistaken for noise, those with 12 are resolved. The walls of those with 16
+    # are merged if the cells are too large.
+    for waves, depth, count in ((30, 0.2, 10000), (12, 0.3, 10000), (16, 0.3, 8000)):
+        directions = np.random.default_rng(20).normal(size=(count, 3))
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
         write_points(folder / f"folds{waves}.csv", directions * (1 + depth * np.cos(waves * directions).prod(1, keepdims=True)))
     write_points(folder / "few.csv", draw("torus", 16, 0.1, count=700)[0])
@@ -318,6 +319,7 @@ JOBS = {  # name: (arguments of covol, kind of truth, shape, file of the points 
     "plate right": (RECONSTRUCT.format("plate5.csv") + " --json r.json", "doubt", "right"),
     "torus right": (RECONSTRUCT.format("torus4.csv") + " --json r.json", "doubt", "right"),
     "folds right": (RECONSTRUCT.format("folds12.csv") + " --json r.json", "doubt", "right"),
+    "folds": (RECONSTRUCT.format("folds16.csv") + " --json r.json", "topology", None),
     "folds wrong": (RECONSTRUCT.format("folds30.csv") + " --json r.json", "doubt", "wrong"),
     "few tag": (RECONSTRUCT.format("few.csv").replace("cloud", "tag"), "cloud", "torus"),
     "cleaned": (RECONSTRUCT.format("spikes2.csv") + " --remove-outliers --smooth wlop", "cloud", "spikes"),
@@ -387,7 +389,7 @@ DOUBTED = ["plate right", "folds right", "folds wrong", "torus right", "m guess 
 PLAN = {  # step of a constant: the jobs in which it is varied
     "common": ["m strays", "spikes noisy", "m torus", "m contours", "m tag", "front", "m grow box", "m guess", "plate", *of_real("FEW_MARKS")[:2]],
     **dict.fromkeys(("cloud", "cloud_scale", "stray", "filled", "indicator", "iteration", "propagation", "local_fit", "crease", "blend", "join_pieces"), CLOUDS),
-    "orientation": [*CLOUDS[:4], "normals noisy", *CLOUDS[4:]], **dict.fromkeys(("views", "layers"), SCANS), "given_sides": GIVEN,
+    "orientation": ["folds", *CLOUDS[:4], "normals noisy", *CLOUDS[4:]], **dict.fromkeys(("views", "layers"), SCANS), "given_sides": GIVEN,
     **dict.fromkeys(("tag_distance", "scan_noise"), TAGGED),
     **dict.fromkeys(("guess", "marks_surface"), [*ALONE[:3], *of_real("MARKS_ALONE"), *ALONE[3:]]), "correction": CORRECTED + of_real("OF_GUESSES"),
     "guidance": GUESSED + of_real("FEW_MARKS")[:6] + LAPSES, "inference": [name for kind in ("FEW_MARKS", "ASTRAY_MARKS", "EXPECTED_DICE", "OF_GUESSES") for name in of_real(kind)], "doubts": DOUBTED,
@@ -412,7 +414,7 @@ def arguments_of(job):
 
 
 def output_of(job, out):
-    return out / {"mask": "m.nrrd", "lapse": "m_t001.nrrd", "real": "m.nrrd", "doubt": "r.json", "expected": "r.json"}.get(JOBS[job][1], "s.ply")
+    return out / {"mask": "m.nrrd", "lapse": "m_t001.nrrd", "real": "m.nrrd", "doubt": "r.json", "expected": "r.json", "topology": "r.json"}.get(JOBS[job][1], "s.ply")
 
 
 def content_of(job, out):
@@ -422,7 +424,8 @@ def content_of(job, out):
         return path.read_bytes()
     report = json.loads(path.read_text())
     content = json.dumps([report.get("warnings"), report.get("expected_dice")]).encode()
-    return content if JOBS[job][1] == "doubt" else content + (out / "m.nrrd").read_bytes()
+    more = {"expected": "m.nrrd", "topology": "s.ply"}.get(JOBS[job][1])
+    return content + (out / more).read_bytes() if more else content
 
 
 def error_of(job, folder, out):
@@ -431,6 +434,9 @@ def error_of(job, folder, out):
         return mask_error(folder, output_of(job, out), shape)
     if kind == "doubt":
         return doubt_error(out, shape)
+    if kind == "topology":  # of a surface that should be one piece without handles
+        surface = json.loads((out / "r.json").read_text())["surface"]
+        return surface["genus"] + surface["components"] - 1
     if kind == "expected":
         return real.expected_error(folder, out, shape)
     if kind == "real":

@@ -10,6 +10,7 @@
 #include "cloud/orientation/attempts.h"
 #include "cloud/orientation/filled.h"
 #include "cloud/orientation/given_sides.h"
+#include "cloud/orientation/heuristics.h"
 #include "cloud/orientation/judge.h"
 #include "cloud/orientation/propagation.h"
 #include "cloud/orientation/stray.h"
@@ -24,6 +25,7 @@ using cloud::doubt;
 using cloud::fraction_missed;
 using cloud::is_clean;
 using cloud::is_settled;
+using cloud::miss_reach;
 
 /// Fraction of the area of the indicator's surface that is farther from every point than coarse_cell().
 double bare_fraction(const CloudOrientation& cloud) {
@@ -47,7 +49,7 @@ void refine(CloudOrientation& cloud, double first_cell, const RunContext& run) {
     const double cell = cloud::indicator_cell(cloud.points, first);
     if (o.indicator->cell() > kCommon.growth * cell) o.indicator = cloud::indicator_of(cloud.points, o, first, run);
     if (!is_settled(o) && is_clean(cloud.scale) &&
-        fraction_missed(*o.indicator, cloud.points, kCloud.coarse * spacing) > kCommon.negligible)
+        fraction_missed(*o.indicator, cloud.points, kOrientation.passed_reach * spacing) > kCommon.negligible)
         o.indicator = cloud::indicator_of(cloud.points, o, first / kCommon.growth, run);
 }
 
@@ -96,7 +98,7 @@ void choose_by_views(CloudOrientation& cloud, double reach, const RunContext& ru
 /// whether there were any
 bool drop_enclosed(CloudOrientation& cloud, PointHints& hints, const cloud::GivenSides& given) {
     const std::vector<char> enclosed = cloud::find_enclosed(cloud.points, given.given, *given.orientation.indicator,
-                                                            cloud.scale, cloud::coarse_cell(cloud.scale));
+                                                            cloud.scale, miss_reach(cloud.scale));
     cloud.enclosed = std::size_t(std::count(enclosed.begin(), enclosed.end(), 1));
     if (cloud.enclosed == 0) return false;
     std::vector<Vec3> left;
@@ -126,7 +128,7 @@ void choose_orientation(CloudOrientation& cloud, double part, PointHints hints, 
     if (!is_certain) {
         cloud.orientation = cloud::try_orientations(cloud.points, cloud.scale, part, run);
         cloud.encloses = does_enclose(cloud);
-        const double reach = kCloud.coarse * cloud.scale.spacing;
+        const double reach = kOrientation.passed_reach * cloud.scale.spacing;
         // Walls inside a solid can be identified only by given normals, and some points of such walls may remain.
         // Therefore given normals are not overruled if they have identified enclosed points.
         if (report.used && cloud.encloses && cloud.enclosed == 0 &&

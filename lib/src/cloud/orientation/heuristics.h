@@ -55,6 +55,8 @@ struct OrientationHeuristics {
     double first_along = limit("orientation.first_along", 192);
     /// [points] Approximate maximum number of points that the iteration uses: limits the time.
     double max_sampled = limit("orientation.max_sampled", 100000);
+    /// [spacings] Distance between a point and the surface above which the surface counts as missing the point.
+    double passed_reach = heuristic("orientation.passed_reach", 1.5);
 };
 COVOL_HEURISTICS OrientationHeuristics kOrientation{};
 

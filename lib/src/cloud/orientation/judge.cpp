@@ -32,6 +32,7 @@ bool is_clean(const CloudScale& scale) { return scale.noise < kCloud.flat * scal
 
 double apart(const CloudScale& scale) { return std::max(scale.spacing, scale.noise); }
 double coarse_cell(const CloudScale& scale) { return kCloud.coarse * apart(scale); }
+double miss_reach(const CloudScale& scale) { return kOrientation.passed_reach * apart(scale); }
 
 double doubt(const Orientation& o) { return o.turned + std::max(0.0, o.off_half - kCommon.negligible); }
 bool is_settled(const Orientation& o) { return doubt(o) < kCloud.few; }

@@ -26,8 +26,10 @@ namespace covol::cloud {
 /// Distance from which on points are not of one sheet: their spacing or, if that is larger, their noise; world units.
 [[nodiscard]] double apart(const CloudScale& scale);
 /// Edge of cells of which hardly any that the surface crosses is empty, world units: kCloud.coarse times apart(). A
-/// position farther than this from every point is bare, and a surface misses a point that is farther than this from it.
+/// position farther than this from every point is bare.
 [[nodiscard]] double coarse_cell(const CloudScale& scale);
+/// Distance between a point and a surface above which the surface counts as missing the point, world units.
+[[nodiscard]] double miss_reach(const CloudScale& scale);
 
 /// Measure of doubt in an orientation: the fraction of normals that changed their side in the last iteration, plus a
 /// penalty if the mean of the indicator at the points differs from 1/2, as it does if whole parts are inverted.

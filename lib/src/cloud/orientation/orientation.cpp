@@ -101,7 +101,7 @@ Orientation try_orientations(const std::vector<Vec3>& points, const CloudScale& 
     const double fraction = std::min(cells * cells, kOrientation.max_sampled / double(points.size()));
     const double maximum = std::max(1.0, double(points.size() / kCommon.sample));
     const Sample sample(points, scale.spacing, std::size_t(std::clamp(1 / fraction, 1.0, maximum)));
-    const double reach = coarse_cell(scale);
+    const double reach = miss_reach(scale);
     std::optional<Consistency> consistency;
     std::vector<std::tuple<double, double, bool>> lattices;
     std::vector<AttemptResult> tried;
