@@ -387,7 +387,7 @@ LINES = ["m line", "m line marks", "m line tag"]
 MESHES = ["relaxed", "adaptive", "spikes", "half open", "half flat", "torus"]
 DOUBTED = ["plate right", "folds right", "folds wrong", "torus right", "m guess bar", "m handles rings", "m handles plate", *of_real("DOUBTED")]
 PLAN = {  # step of a constant: the jobs in which it is varied
-    "common": ["m strays", "spikes noisy", "m torus", "m contours", "m tag", "front", "m grow box", "m guess", "plate", *of_real("FEW_MARKS")[:2]],
+    "common": ["m strays", "spikes noisy", "m torus", "m contours", "m tag", "front", "m grow box", "m guess", "plate", *of_real("FEW_MARKS")[:2], *of_real("ASTRAY_MARKS")[:1]],
     **dict.fromkeys(("cloud", "cloud_scale", "stray", "filled", "indicator", "iteration", "propagation", "local_fit", "crease", "blend", "join_pieces"), CLOUDS),
     "orientation": ["folds", *CLOUDS[:4], "normals noisy", *CLOUDS[4:]], **dict.fromkeys(("views", "layers"), SCANS), "given_sides": GIVEN,
     **dict.fromkeys(("tag_distance", "scan_noise"), TAGGED),

@@ -33,8 +33,8 @@ inline constexpr auto kOptions<CorrectionOptions> =
     std::tuple{Option{"precision", &CorrectionOptions::precision, kPositive},
                Option{"guess_radius", &CorrectionOptions::min_radius, kPositiveLength, with_image(Group::ReadingMarks),
                       "minimum radius around a mark within which the guess changes",
-                      "12vx, or twice the image's widest spacing; 2.2 times the mark's distance to the guess, if that "
-                      "is larger"}};
+                      "12vx, or twice the image's widest spacing; 3 times the mark's distance to the guess if the mark "
+                      "lies inside, 2.2 times if outside, if that is larger"}};
 
 struct CorrectionReport {
     /// number of marks, and number of seeds that act like marks because they lie on the wrong side of the guess or of
@@ -57,9 +57,9 @@ struct CorrectedMask {
 /// A guess, corrected by marks: its new level set is s - c, where s is the guess's signed distance and c a sum of
 /// smooth bumps of compact support (Wendland, Adv. Comput. Math. 4, 1995, C2) around the marks.
 ///
-/// The radius of a bump is 2.2 times the distance between mark and guess, but at least the minimum radius. The factor
-/// exceeds 2.11, the maximum slope of a bump times its radius divided by its height: c is then less steep than s, and
-/// s - c stays monotone across the surface. Marks with bumps of
+/// The radius of a bump is 3 times the distance between mark and guess for corrections inward and 2.2 times for outward
+/// ones, but at least the minimum radius. Both factors exceed 2.11, the maximum slope of a bump times its radius
+/// divided by its height: c is then less steep than s, and s - c stays monotone across the surface. Marks with bumps of
 /// similar size are solved for together (kriging with the marks' precision as the noise), the largest bumps first;
 /// marks that larger bumps already satisfy remain constraints for the smaller ones. Beyond all bumps c is exactly 0. If
 /// a bump is wider than the minimum radius, its effect beyond the convex hull of guess and marks is halved, so that a

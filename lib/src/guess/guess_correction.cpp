@@ -224,7 +224,9 @@ std::vector<double> solve(const std::vector<Target>& targets, double radius, dou
 /// Adds bumps until their sum at each target is its shift, starting with the targets with the largest shifts.
 void add_bumps(std::vector<Bump>& bumps, const std::vector<Target>& targets, double min_radius, double precision) {
     std::vector<Target> met, open = targets;
-    const auto radius_of = [&](double shift) { return std::max(min_radius, kCorrection.radius * std::abs(shift)); };
+    const auto radius_of = [&](double shift) {
+        return std::max(min_radius, (shift > 0 ? kCorrection.radius_outward : -kCorrection.radius_of_residual) * shift);
+    };
     while (!open.empty()) {
         std::vector<double> left;
         double radius = min_radius;

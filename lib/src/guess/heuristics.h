@@ -17,10 +17,13 @@ COVOL_HEURISTICS GuessHeuristics kGuess{};
 
 /// A guess corrected by marks: guess_correction.cpp.
 struct CorrectionHeuristics {
-    /// [distances between mark and guess] Radius of a bump. Above 2.11 the bump is less steep than the guess's
-    /// distance, so that the result remains monotone across the surface (covol/guess_correction.h). A wider one
-    /// inflates the correct surface beside a missing part (tests/bench/marks/correction.py).
-    double radius = heuristic("correction.radius", 2.2);
+    /// [distances between mark and guess] Radius of a bump that moves the guess inward. Above 2.11 the bump is less
+    /// steep than the guess's distance, so that the result remains monotone across the surface
+    /// (covol/guess_correction.h).
+    double radius_of_residual = heuristic("correction.radius_of_residual", 3.0);
+    /// [distances between mark and guess] Radius of a bump that moves the guess outward; a wide one inflates the
+    /// correct surface beside a missing part (tests/bench/marks/correction.py).
+    double radius_outward = heuristic("correction.radius_outward", 2.2);
 };
 COVOL_HEURISTICS CorrectionHeuristics kCorrection{};
 
