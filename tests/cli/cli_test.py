@@ -344,7 +344,7 @@ class Tools(Case):
         self.assertGreater(self.report("compare", "m.nrrd", bare, "--spacing", f"{H},{H},{H}")["compare"]["dice"], 0.95)
         # A part of the space can be compared only for label images.
         self.segment(points=self.sparse)
-        error = self.run_covol("compare", "s.vdb", self.sparse, "--roi", "0,0,0,1,1,1", code=2).stderr
+        error = self.run_covol("compare", "s.vdb", self.sparse, "--roi", "0,0,0,1,1,1", code=3).stderr
         self.assertIn("expected two label images to crop", error)
 
     def test_info_of_each_kind(self):
