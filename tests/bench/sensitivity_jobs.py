@@ -125,12 +125,10 @@ def make_clouds(folder):
     write_points(folder / "normals_wrong.csv", points, np.where(points[:, :1] > 0.3, -1, 1) * normals)
     points, normals = draw("plate", 17, 0.9)  # noise moves points across the plate
     write_points(folder / "normals_thin.csv", points, normals)
-    points, normals = draw("torus", 18, 0.2)
-    normals = np.random.default_rng(18).normal(size=normals.shape)
-    write_points(folder / "normals_random.csv", points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
-    points, normals = draw("spikes", 21, 0.6, count=2000)
-    normals = np.random.default_rng(21).normal(size=normals.shape)
-    write_points(folder / "normals_noisy.csv", points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
+    for name, shape, seed, noise, count in (("random", "torus", 18, 0.2, COUNT), ("noisy", "spikes", 21, 0.6, 2000)):
+        points = draw(shape, seed, noise, count=count)[0]
+        normals = np.random.default_rng(seed).normal(size=points.shape)
+        write_points(folder / f"normals_{name}.csv", points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
     write_points(folder / "needles.csv", draw("needles", 22, 0.5, count=2500)[0])
     write_points(folder / "thick.csv", draw("torus", 15, 0.7, count=5000)[0])
     # Folds of a ball: those with 30 waves are mistaken for noise, those with 12 are resolved. The walls of those with 16
@@ -182,10 +180,15 @@ def read_nrrd(path):
 MOVED = {"round": (2, -3, 1), "torus": (1, 2, 2), "two": (-2, 1, 0), "box": (1, -1, 2), "sphere": (3, 0, -2), "many": (0, 2, -2)}  # voxels along z, y and x, from one image of a time-lapse to the next
 
 
+def places():
+    """x, y and z of the voxels of a phantom, each an array with the axes z, y, x."""
+    at = (np.arange(44) - 21.5) * 2.6 / 44
+    return np.meshgrid(at, at, at, indexing="ij")[::-1]
+
+
 def write_torus_lines(folder, head):
     """An image of the torus whose surface is a bright line, and scribbles inside the torus on every sixth slice."""
-    at = (np.arange(44) - 21.5) * 2.6 / 44
-    z, y, x = np.meshgrid(at, at, at, indexing="ij")
+    x, y, z = places()
     off = (np.hypot(np.hypot(x, y) - 0.75, z) - 0.3) * 44 / 2.6  # voxels
     line = 20 + 150 * np.exp(-(off / 1.5) ** 2) + np.random.default_rng(19).normal(0, 15, off.shape)
     (folder / "p_line.nrrd").write_bytes(head + line.clip(0, 255).astype("u1").tobytes())
@@ -196,8 +199,7 @@ def write_torus_lines(folder, head):
 
 def write_bar(folder, head):
     """A bar whose sections, 15 by 3 voxels, are painted as areas on every sixth slice."""
-    at = (np.arange(44) - 21.5) * 2.6 / 44
-    z, y, x = np.meshgrid(at, at, at, indexing="ij")
+    x, y, z = places()
     inside = (np.abs(x) < 0.45) & (np.abs(y) < 0.09) & (np.abs(z) < 0.9)
     image = 60 + 100 * inside + np.random.default_rng(21).normal(0, 15, inside.shape)
     (folder / "p_bar.nrrd").write_bytes(head + image.clip(0, 255).astype("u1").tobytes())
@@ -389,7 +391,7 @@ DOUBTED = ["plate right", "folds right", "folds wrong", "torus right", "m guess 
 PLAN = {  # step of a constant: the jobs in which it is varied
     "common": ["m strays", "spikes noisy", "m torus", "m contours", "m tag", "front", "m grow box", "m guess", "plate", *of_real("FEW_MARKS")[:2], *of_real("ASTRAY_MARKS")[:1]],
     **dict.fromkeys(("cloud", "cloud_scale", "stray", "filled", "indicator", "iteration", "propagation", "local_fit", "crease", "blend", "join_pieces"), CLOUDS),
-    "orientation": ["folds", *CLOUDS[:4], "normals noisy", *CLOUDS[4:]], **dict.fromkeys(("views", "layers"), SCANS), "given_sides": GIVEN,
+    "orientation": ["folds", *CLOUDS[:4], "normals noisy", "normals random", *CLOUDS[4:]], **dict.fromkeys(("views", "layers"), SCANS), "given_sides": GIVEN,
     **dict.fromkeys(("tag_distance", "scan_noise"), TAGGED),
     **dict.fromkeys(("guess", "marks_surface"), [*ALONE[:3], *of_real("MARKS_ALONE"), *ALONE[3:]]), "correction": CORRECTED + of_real("OF_GUESSES"),
     "guidance": GUESSED + of_real("FEW_MARKS")[:6] + LAPSES, "inference": [name for kind in ("FEW_MARKS", "ASTRAY_MARKS", "EXPECTED_DICE", "OF_GUESSES") for name in of_real(kind)], "doubts": DOUBTED,
